@@ -1,0 +1,23 @@
+cdef class Clearance:
+    cdef readonly float[:, ::1] field
+    cdef readonly double resolution
+    cdef readonly double margin
+    cdef double x0, y0, cos_yaw, sin_yaw
+    cdef readonly double width, height
+    cdef double exact(self, double x, double y) noexcept nogil
+    cdef double at_least(self, double x, double y, double enough) noexcept nogil
+    cdef bint free(self, double x, double y, double need) noexcept nogil
+    cdef double arc_is_free(self, double x, double y, double theta, double radius, int turn, double length, double s,
+                            double need) noexcept nogil
+    cdef bint curve_is_free(self, double x, double y, double theta, double radius, int word,
+                            double first, double second, double third, double need) noexcept nogil
+
+cdef class GridClearance(Clearance):
+    cdef int[:, ::1] to_left
+    cdef int[:, ::1] to_right
+    cdef double squared_across(self, double x, int row, int column) noexcept nogil
+
+cdef class PolygonClearance(Clearance):
+    cdef double[:, ::1] edges
+    cdef long long[::1] first_edge
+    cdef int[::1] edge_of

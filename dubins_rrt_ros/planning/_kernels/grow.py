@@ -1,0 +1,245 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""The inner loops of Algorithm 1 (RRT) and Algorithm 2 (RRT*) of A. Khanal, RRT and RRT* Using Vehicle Dynamics.
+
+Algorithm 2 is completed by the half that it leaves out and S. Karaman and E. Frazzoli, Sampling-based algorithms for optimal
+motion planning (2011), have: the parent of a new node is chosen among its near nodes too, not only theirs rewired.
+"""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.near import GainSet, NearSet
+    from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
+    from cython.cimports.libc.math import ceil, fabs, log, remainder
+else:
+    from math import ceil, fabs, log, remainder
+
+    from .clearance import Clearance
+    from .dubins import TWO_PI, drive, turn_of
+    from .near import GainSet, NearSet
+    from .tree import SearchTree
+
+#: A smaller gain is rounding, and no reason to rewire [m].
+LEAST_GAIN = cython.declare(cython.double, 1e-9)
+NO_WAY = cython.declare(cython.double, 1e300)
+
+
+@cython.cclass
+class Grower:
+    """Adds samples to a tree.
+
+    Attributes:
+        goal_nodes: the nodes that reach the goal are its first `goal_count`.
+    """
+
+    tree: SearchTree
+    clearance: Clearance
+    need: cython.double
+    step: cython.double
+    near_factor: cython.double
+    goal_x: cython.double
+    goal_y: cython.double
+    goal_theta: cython.double
+    tolerance_xy: cython.double
+    tolerance_yaw: cython.double
+    to: NearSet
+    onward: GainSet
+    goal_nodes: cython.int[::1]
+    goal_count = cython.declare(cython.int, visibility="readonly")
+
+    def __init__(self, tree: SearchTree, clearance: Clearance, need, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
+        """
+        Args:
+            need: the clearance that every edge keeps [m].
+            step: the longest new edge [m]; 0 is unlimited.
+            near_factor: near sets have near_factor * log(size) nodes, at most `most_near`.
+            goal: (x, y, theta); tolerance_xy [m] and tolerance_yaw [rad] say what counts as reaching it.
+        """
+        self.tree = tree
+        self.clearance = clearance
+        self.need, self.step, self.near_factor = need, step, near_factor
+        self.goal_x, self.goal_y, self.goal_theta = goal
+        self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
+        self.to = NearSet(tree, most_near)
+        self.onward = GainSet(tree, most_near)
+        self.goal_nodes = np.empty(0, np.int32)
+        self.goal_count = 0
+
+    def reserve(self, more: cython.int):
+        """Make room for `more` nodes, so that adding them allocates nothing."""
+        self.tree.reserve(more)
+        if self.goal_count + more > self.goal_nodes.shape[0]:
+            grown = np.empty(2 * (self.goal_count + more), np.int32)
+            grown[:self.goal_count] = self.goal_nodes[:self.goal_count]
+            self.goal_nodes = grown
+
+    def best_goal_node(self) -> int:
+        """The cheapest node that reaches the goal, or -1."""
+        best: cython.int = -1
+        i: cython.int
+        for i in range(self.goal_count):
+            if best < 0 or self.tree.costs[self.goal_nodes[i]] < self.tree.costs[best]:
+                best = self.goal_nodes[i]
+        return best
+
+    def rrt(self, samples: cython.double[:, ::1], begin: cython.int, end: cython.int) -> int:
+        """Algorithm 1 over rows of (n, 3) samples; ends with the first path. Returns the row after the last one used."""
+        i: cython.int = begin
+        with cython.nogil:
+            while i < end and self.goal_count == 0:
+                self.extend(samples[i, 0], samples[i, 1], samples[i, 2])
+                i += 1
+        return i
+
+    def rrt_star(self, samples: cython.double[:, ::1], begin: cython.int, end: cython.int) -> int:
+        """Algorithm 2 over rows of (n, 3) samples; pauses at the first path. Returns the row after the last one used."""
+        i: cython.int = begin
+        had_path: cython.bint = self.goal_count > 0
+        with cython.nogil:
+            while i < end and (had_path or self.goal_count == 0):
+                self.extend_and_rewire(samples[i, 0], samples[i, 1], samples[i, 2])
+                i += 1
+        return i
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def extend(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
+        """One round of Algorithm 1: find the closest link, steer towards the sample, add unless it collides."""
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        if self.step == 0 and not self.clearance.free(x, y, self.need):
+            return
+        x, y, theta, word, first, second, third = self.steer(x, y, theta)
+        if first + second + third == 0:
+            return
+        if self.edge_is_free(self.to.nodes[0], word, first, second, third):
+            self.add(x, y, theta, self.to.nodes[0], word, first, second, third)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def extend_and_rewire(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
+        """One round of Algorithm 2: steer, choose the parent among the near nodes, add, rewire the near nodes through it."""
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        if self.step > 0:
+            x, y, theta, word, first, second, third = self.steer(x, y, theta)
+        if not self.clearance.free(x, y, self.need):
+            return
+        near: cython.int = cython.cast(cython.int, ceil(self.near_factor * log(self.tree.size + 1)))
+        self.to.collect_nearest(x, y, theta, near)
+        node: cython.int
+        if self.to.keys[0] == 0:
+            # The goal is drawn again and again; once it is in the tree, that is another try to reach it from elsewhere.
+            node = self.to.nodes[0]
+            self.choose_parent(x, y, theta, node, self.tree.costs[node] - LEAST_GAIN)
+            return
+        reach: cython.double = self.to.reach
+        node = self.choose_parent(x, y, theta, -1, NO_WAY)
+        if node >= 0:
+            self.rewire(node, reach)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def steer(self, x: cython.double, y: cython.double, theta: cython.double
+              ) -> tuple[cython.double, cython.double, cython.double, cython.int, cython.double, cython.double, cython.double]:
+        """The pose, and the edge to it, that lies from the closest node towards the sample, at most a step away."""
+        self.to.collect_nearest(x, y, theta, 1)
+        node: cython.int = self.to.nodes[0]
+        word: cython.int = self.to.words[0]
+        first: cython.double = self.to.lengths[0, 0]
+        second: cython.double = self.to.lengths[0, 1]
+        third: cython.double = self.to.lengths[0, 2]
+        if self.step == 0 or first + second + third <= self.step:
+            return x, y, theta, word, first, second, third
+        first = min(first, self.step)
+        second = min(second, self.step - first)
+        third = min(third, self.step - first - second)
+        x, y, theta = self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2]
+        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 0), first)
+        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 1), second)
+        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 2), third)
+        return x, y, remainder(theta, TWO_PI), word, first, second, third
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def choose_parent(self, x: cython.double, y: cython.double, theta: cython.double, node: cython.int,
+                      limit: cython.double) -> cython.int:
+        """Attach the pose by the cheapest free edge from its near nodes, if it then costs less than `limit`.
+
+        `node` is the pose's own, or -1 to add one; what is returned is the node, or -1 where no edge serves.
+        """
+        cheapest: cython.double
+        cost: cython.double
+        i: cython.int
+        best: cython.int
+        parent: cython.int
+        while True:
+            cheapest, best = limit, -1
+            for i in range(self.to.count):
+                cost = self.tree.costs[self.to.nodes[i]] + self.to.keys[i]
+                if cost < cheapest:
+                    cheapest, best = cost, i
+            if best < 0:
+                return -1
+            parent = self.to.nodes[best]
+            if self.edge_is_free(parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
+                                 self.to.lengths[best, 2]):
+                break
+            self.to.keys[best] = NO_WAY
+        if node < 0:
+            return self.add(x, y, theta, parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
+                            self.to.lengths[best, 2])
+        self.tree.reparent(node, parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
+                           self.to.lengths[best, 2])
+        return node
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def rewire(self, node: cython.int, reach: cython.double) -> cython.void:
+        """Reroute through `node` each near node that is cheaper so, and free. Its ancestors cannot be cheaper."""
+        i: cython.int
+        near: cython.int
+        self.onward.collect_gaining(node, reach, LEAST_GAIN)
+        for i in range(self.onward.count):
+            near = self.onward.nodes[i]
+            if (self.tree.costs[node] + self.onward.keys[i] < self.tree.costs[near] - LEAST_GAIN
+                    and self.edge_is_free(node, self.onward.words[i], self.onward.lengths[i, 0], self.onward.lengths[i, 1],
+                                          self.onward.lengths[i, 2])):
+                self.tree.reparent(near, node, self.onward.words[i], self.onward.lengths[i, 0], self.onward.lengths[i, 1],
+                                   self.onward.lengths[i, 2])
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def edge_is_free(self, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
+                     third: cython.double) -> cython.bint:
+        """Whether the curve from a node keeps its clearance."""
+        return self.clearance.curve_is_free(self.tree.poses[parent, 0], self.tree.poses[parent, 1], self.tree.poses[parent, 2],
+                                            self.tree.radius, word, first, second, third, self.need)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def add(self, x: cython.double, y: cython.double, theta: cython.double, parent: cython.int, word: cython.int,
+            first: cython.double, second: cython.double, third: cython.double) -> cython.int:
+        """Add a node, and note it where it reaches the goal."""
+        node: cython.int = self.tree.add(x, y, theta, parent, word, first, second, third)
+        dx: cython.double = x - self.goal_x
+        dy: cython.double = y - self.goal_y
+        if (dx * dx + dy * dy <= self.tolerance_xy * self.tolerance_xy
+                and fabs(remainder(theta - self.goal_theta, TWO_PI)) <= self.tolerance_yaw):
+            self.goal_nodes[self.goal_count] = node
+            self.goal_count += 1
+        return node

@@ -1,0 +1,26 @@
+from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
+
+cdef class NearSet:
+    cdef SearchTree tree
+    cdef int count
+    cdef int wanted
+    cdef double reach
+    cdef double x
+    cdef double y
+    cdef double theta
+    cdef double sin_theta
+    cdef double cos_theta
+    cdef double[::1] keys
+    cdef int[::1] nodes
+    cdef signed char[::1] words
+    cdef double[:, ::1] lengths
+    cdef void begin(self, double x, double y, double theta, double reach) noexcept nogil
+    cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
+    cdef void consider(self, int node, double dx, double dy, double bound) noexcept nogil
+    cdef void consider_bucket(self, int row, int column) noexcept nogil
+    cdef void consider_all(self) noexcept nogil
+    cdef void collect_nearest(self, double x, double y, double theta, int wanted) noexcept nogil
+
+cdef class GainSet(NearSet):
+    cdef double cost
+    cdef void collect_gaining(self, int node, double reach, double least_gain) noexcept nogil

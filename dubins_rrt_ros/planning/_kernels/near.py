@@ -1,0 +1,196 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""Near sets by Dubins length, which is not symmetric: *near to a pose* and *near from a pose* are two questions.
+
+S. Karaman and E. Frazzoli, Sampling-based optimal motion planning for non-holonomic dynamical systems (2013), have both.
+The search is exact: buckets are visited ring by ring, and a ring whose straight-line distance is too long ends it, since no
+Dubins curve is shorter than the straight line, nor than the turn from heading to heading.
+"""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, shortest_within
+    from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
+    from cython.cimports.libc.math import cos, fabs, sin, sqrt
+else:
+    from math import cos, fabs, sin, sqrt
+
+    from .dubins import NO_CURVE, TWO_PI, shortest_within
+    from .tree import SearchTree
+
+
+@cython.cclass
+class NearSet:
+    """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
+
+    `keys` are the lengths of the curves; the first `count` entries of all arrays are in use. Nodes whose curve is not
+    shorter than `reach` are of no interest; it shrinks as nodes are found.
+    """
+
+    def __init__(self, tree: SearchTree, capacity: cython.int):
+        self.tree = tree
+        self.count = 0
+        self.keys = np.empty(capacity)
+        self.nodes = np.empty(capacity, np.int32)
+        self.words = np.empty(capacity, np.int8)
+        self.lengths = np.empty((capacity, 3))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def collect_nearest(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int) -> cython.void:
+        """Find the `wanted` nodes with the shortest curves to a pose, at most as many as there is room for."""
+        self.begin(x, y, theta, NO_CURVE)
+        self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
+        self.consider_all()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def begin(self, x: cython.double, y: cython.double, theta: cython.double, reach: cython.double) -> cython.void:
+        """Empty the set and set the pose that it is about."""
+        self.count = 0
+        self.reach = reach
+        self.x, self.y, self.theta = x, y, theta
+        self.sin_theta, self.cos_theta = sin(theta), cos(theta)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def insert(self, node: cython.int, word: cython.int, first: cython.double, second: cython.double,
+               third: cython.double) -> cython.void:
+        """Insert a node by the length of its curve; the longest one drops out when there is no more room."""
+        if self.count < self.wanted:
+            self.count += 1
+        key: cython.double = first + second + third
+        i: cython.int = self.count - 1
+        while i > 0 and self.keys[i - 1] > key:
+            self.keys[i] = self.keys[i - 1]
+            self.nodes[i] = self.nodes[i - 1]
+            self.words[i] = self.words[i - 1]
+            self.lengths[i, 0] = self.lengths[i - 1, 0]
+            self.lengths[i, 1] = self.lengths[i - 1, 1]
+            self.lengths[i, 2] = self.lengths[i - 1, 2]
+            i -= 1
+        self.keys[i] = key
+        self.nodes[i] = node
+        self.words[i] = word
+        self.lengths[i, 0] = first
+        self.lengths[i, 1] = second
+        self.lengths[i, 2] = third
+        if self.count == self.wanted:
+            self.reach = self.keys[self.count - 1]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, bound: cython.double) -> cython.void:
+        """Take a node, which lies (dx, dy) from the pose, if its curve to the pose, at least `bound` long, is short enough."""
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        word, first, second, third = shortest_within(
+            -dx, -dy, self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1],
+            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.reach)
+        if first < NO_CURVE:
+            self.insert(node, word, first, second, third)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def consider_bucket(self, row: cython.int, column: cython.int) -> cython.void:
+        """Consider the nodes of a bucket that the lower bound does not rule out."""
+        dx: cython.double
+        dy: cython.double
+        bound: cython.double
+        node: cython.int = self.tree.buckets[row, column]
+        while node >= 0:
+            dx = self.tree.poses[node, 0] - self.x
+            dy = self.tree.poses[node, 1] - self.y
+            bound = max(sqrt(dx * dx + dy * dy), self.tree.radius * turned(self.theta, self.tree.poses[node, 2]))
+            if bound < self.reach:
+                self.consider(node, dx, dy, bound)
+            node = self.tree.next_in_bucket[node]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def consider_all(self) -> cython.void:
+        """Consider the nodes bucket by bucket, in rings around the pose, until a ring is out of reach."""
+        row: cython.int = self.tree.bucket_row(self.y)
+        column: cython.int = self.tree.bucket_column(self.x)
+        rows: cython.int = cython.cast(cython.int, self.tree.buckets.shape[0])
+        columns: cython.int = cython.cast(cython.int, self.tree.buckets.shape[1])
+        side: cython.double = self.tree.bucket_size
+        # Ring k lies k - 1 buckets beyond the nearest side of the pose's own bucket.
+        u: cython.double = self.x - self.tree.x0 - column * side
+        v: cython.double = self.y - self.tree.y0 - row * side
+        inner: cython.double = min(min(u, side - u), min(v, side - v))
+        rings: cython.int = 1 + max(max(row, rows - 1 - row), max(column, columns - 1 - column))
+        ring: cython.int
+        i: cython.int
+        j: cython.int
+        for ring in range(rings):
+            if ring > 0 and inner + (ring - 1) * side >= self.reach:
+                return
+            for i in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+                if i == row - ring or i == row + ring:
+                    for j in range(max(column - ring, 0), min(column + ring, columns - 1) + 1):
+                        self.consider_bucket(i, j)
+                else:
+                    if column - ring >= 0:
+                        self.consider_bucket(i, column - ring)
+                    if column + ring < columns:
+                        self.consider_bucket(i, column + ring)
+
+
+@cython.cclass
+class GainSet(NearSet):
+    """The nodes that would be cheaper if they were reached *from* a node, within reach, with the curves to them."""
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def collect_gaining(self, node: cython.int, reach: cython.double, least_gain: cython.double) -> cython.void:
+        """Find the nodes that gain more than `least_gain` by a curve shorter than `reach` from `node`."""
+        self.begin(self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2], reach)
+        self.cost = self.tree.costs[node] + least_gain
+        self.consider_all()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, bound: cython.double) -> cython.void:
+        """Take a node if it gains; where there is no more room, the others have to wait for the next chance."""
+        limit: cython.double = min(self.reach, self.tree.costs[node] - self.cost)
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        if bound >= limit or self.count >= self.keys.shape[0]:
+            return
+        word, first, second, third = shortest_within(
+            dx, dy, self.theta, self.sin_theta, self.cos_theta,
+            self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1], self.tree.radius, limit)
+        if first < NO_CURVE:
+            self.nodes[self.count] = node
+            self.words[self.count] = word
+            self.keys[self.count] = first + second + third
+            self.lengths[self.count, 0] = first
+            self.lengths[self.count, 1] = second
+            self.lengths[self.count, 2] = third
+            self.count += 1
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
+    """The angle between two headings, or 0 where they are too far from [-pi, pi] to tell without a division."""
+    angle: cython.double = fabs(theta1 - theta0)
+    if angle > TWO_PI / 2:
+        angle = fabs(TWO_PI - angle)
+    return angle if angle <= TWO_PI / 2 else 0

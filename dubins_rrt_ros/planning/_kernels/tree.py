@@ -1,0 +1,169 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""The search tree: a structure of arrays. A node's edge comes from its parent: a word and three lengths."""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.libc.math import cos, sin, sqrt
+else:
+    from math import cos, sin, sqrt
+
+
+@cython.cclass
+class SearchTree:
+    """A tree of poses, hashed by position.
+
+    Attributes:
+        size: how many nodes there are; node 0 is the root. The arrays are longer.
+        radius: the turning radius of all edges [m].
+        poses: (n, 3): x [m], y [m], theta [rad].
+        headings: (n, 2): sine and cosine of theta.
+        parents: (n,), the root's is -1.
+        costs: (n,): the length of the path from the root [m].
+        words, lengths: (n,) and (n, 3): the edges from the parents; lengths in metres.
+    """
+
+    def __init__(self, root, radius: cython.double, corner, extent, expected: cython.int):
+        """A tree of its root alone.
+
+        Args:
+            root: (x, y, theta).
+            corner, extent: lowest (x, y) of the map, and its size [m].
+            expected: how many nodes there will be, which sets the size of the buckets.
+        """
+        self.radius = radius
+        self.x0, self.y0 = corner
+        width, height = extent
+        self.bucket_size = sqrt(width * height / min(max(expected / 2, 64), 65536))
+        shape = (int(height / self.bucket_size) + 1, int(width / self.bucket_size) + 1)
+        self.buckets = np.full(shape, -1, dtype=np.int32)
+        self.size = 0
+        self.poses = np.empty((0, 3))
+        self.headings = np.empty((0, 2))
+        self.parents = self.first_child = self.next_sibling = self.previous_sibling = self.next_in_bucket = np.empty(0, np.int32)
+        self.costs = np.empty(0)
+        self.words = np.empty(0, np.int8)
+        self.lengths = np.empty((0, 3))
+        self.reserve(64)
+        self.add(root[0], root[1], root[2], -1, 0, 0, 0, 0)
+
+    def reserve(self, more: cython.int):
+        """Make room for `more` nodes, so that adding them allocates nothing."""
+        if self.size + more <= self.parents.shape[0]:
+            return
+        capacity = max(self.size + more, 2 * self.size)
+        self.poses = _grown(self.poses, capacity)
+        self.headings = _grown(self.headings, capacity)
+        self.parents = _grown(self.parents, capacity)
+        self.costs = _grown(self.costs, capacity)
+        self.words = _grown(self.words, capacity)
+        self.lengths = _grown(self.lengths, capacity)
+        self.first_child = _grown(self.first_child, capacity)
+        self.next_sibling = _grown(self.next_sibling, capacity)
+        self.previous_sibling = _grown(self.previous_sibling, capacity)
+        self.next_in_bucket = _grown(self.next_in_bucket, capacity)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def bucket_row(self, y: cython.double) -> cython.int:
+        """The row of the bucket that holds `y`, the nearest outside the map."""
+        row: cython.int = cython.cast(cython.int, (y - self.y0) / self.bucket_size)
+        return min(max(row, 0), cython.cast(cython.int, self.buckets.shape[0]) - 1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def bucket_column(self, x: cython.double) -> cython.int:
+        """The column of the bucket that holds `x`, the nearest outside the map."""
+        column: cython.int = cython.cast(cython.int, (x - self.x0) / self.bucket_size)
+        return min(max(column, 0), cython.cast(cython.int, self.buckets.shape[1]) - 1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def attach(self, node: cython.int, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
+               third: cython.double) -> cython.void:
+        """Make `node`, which has no parent, a child of `parent`."""
+        self.parents[node] = parent
+        self.words[node] = word
+        self.lengths[node, 0] = first
+        self.lengths[node, 1] = second
+        self.lengths[node, 2] = third
+        self.costs[node] = self.costs[parent] + (first + second + third)
+        sibling: cython.int = self.first_child[parent]
+        self.first_child[parent] = node
+        self.next_sibling[node] = sibling
+        self.previous_sibling[node] = -1
+        if sibling >= 0:
+            self.previous_sibling[sibling] = node
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def add(self, x: cython.double, y: cython.double, theta: cython.double, parent: cython.int, word: cython.int,
+            first: cython.double, second: cython.double, third: cython.double) -> cython.int:
+        """Add a node and return it; room must have been reserved. The root is added with the parent -1."""
+        node: cython.int = self.size
+        self.size += 1
+        self.poses[node, 0] = x
+        self.poses[node, 1] = y
+        self.poses[node, 2] = theta
+        self.headings[node, 0] = sin(theta)
+        self.headings[node, 1] = cos(theta)
+        self.first_child[node] = -1
+        if parent < 0:
+            self.parents[node] = self.next_sibling[node] = self.previous_sibling[node] = -1
+            self.costs[node] = self.words[node] = 0
+            self.lengths[node, 0] = self.lengths[node, 1] = self.lengths[node, 2] = 0
+        else:
+            self.attach(node, parent, word, first, second, third)
+        row: cython.int = self.bucket_row(y)
+        column: cython.int = self.bucket_column(x)
+        self.next_in_bucket[node] = self.buckets[row, column]
+        self.buckets[row, column] = node
+        return node
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def reparent(self, node: cython.int, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
+                 third: cython.double) -> cython.void:
+        """Move `node` with all its descendants below `parent`, which must be none of them; their costs follow."""
+        before: cython.int = self.previous_sibling[node]
+        after: cython.int = self.next_sibling[node]
+        if before >= 0:
+            self.next_sibling[before] = after
+        else:
+            self.first_child[self.parents[node]] = after
+        if after >= 0:
+            self.previous_sibling[after] = before
+        self.attach(node, parent, word, first, second, third)
+        self.update_costs_below(node)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def update_costs_below(self, root: cython.int) -> cython.void:
+        """Recompute the costs of all descendants of `root`, in preorder along the links, without a stack."""
+        node: cython.int = self.first_child[root]
+        while node >= 0:
+            self.costs[node] = self.costs[self.parents[node]] + (
+                self.lengths[node, 0] + self.lengths[node, 1] + self.lengths[node, 2])
+            if self.first_child[node] >= 0:
+                node = self.first_child[node]
+                continue
+            while node != root and self.next_sibling[node] < 0:
+                node = self.parents[node]
+            if node == root:
+                return
+            node = self.next_sibling[node]
+
+
+def _grown(view, capacity):
+    """A copy of an array with room for `capacity` rows."""
+    array = np.asarray(view)
+    grown = np.empty((capacity, *array.shape[1:]), array.dtype)
+    grown[:len(array)] = array
+    return grown

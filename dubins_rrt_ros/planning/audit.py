@@ -1,0 +1,212 @@
+"""The independent judge of paths: shapely and plain numpy, no code in common with the planner.
+
+It drives the curves by its own solution of the car's equations (1), and measures distances to the obstacles' true shapes.
+The verdict on clearance holds between samples too: on a piece of length s with clearances c and c' at its ends no point has
+less than (c + c' - s) / 2, since the clearance changes by at most a metre per metre; pieces are halved until that decides.
+"""
+
+import math
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import shapely
+
+from .map import GridMap, Map
+from .path import Path
+from .problem import Problem
+
+#: How far a curve may end from where the next one begins [m, rad], and relatively how much tighter a turn may be.
+TOLERANCE = 1e-6
+#: A sample this much too near an obstacle is a finding [m]; what may lie between samples is at most that nearer still.
+CONTACT = 1e-6
+#: The least clearance is found to within this [m].
+PRECISION = 1e-3
+FIRST_PIECE = 0.1
+
+_judges: WeakKeyDictionary[Map, dict[bool, "_Obstacles"]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What the audit found.
+
+    Attributes:
+        findings: what is wrong with the path, one sentence each; none where it is right.
+        min_clearance: the least distance between path and obstacles, to within a millimetre [m].
+        max_curvature: [1/m].
+    """
+
+    findings: tuple[str, ...]
+    min_clearance: float
+    max_curvature: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing was found."""
+        return not self.findings
+
+
+def audit(path: Path, problem: Problem) -> Audit:
+    """Judge a path of a problem: its ends, its joints, its turns and its clearance."""
+    starts, ends, arcs = _drive(path)
+    findings = [*_end_findings(path, problem), *_joint_findings(path, starts, ends), *_turn_findings(path, problem)]
+    obstacles = _obstacles_of(problem)
+    least, where = _least_clearance(arcs, obstacles, problem.vehicle.robot_radius)
+    if least < problem.vehicle.robot_radius - CONTACT:
+        findings.append(f"at ({where[0]:.3f}, {where[1]:.3f}) the clearance is {least:.6f} m, "
+                        f"less than the robot's radius, {problem.vehicle.robot_radius:g} m")
+    turning = [curve.radius for curve in path.curves if _turns(curve)]
+    return Audit(tuple(findings), least, 1 / min(turning) if turning else 0.0)
+
+
+@dataclass(frozen=True)
+class _Arcs:
+    """Arcs as arrays: where they begin, their curvature [1/m] (left is positive) and their length [m]."""
+
+    x: np.ndarray
+    y: np.ndarray
+    theta: np.ndarray
+    curvature: np.ndarray
+    length: np.ndarray
+
+    def at(self, index: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The poses at arc lengths `s` of the arcs `index`: along the chord, which halves the turn."""
+        half = self.curvature[index] * s / 2
+        chord = s * np.sinc(half / math.pi)
+        direction = self.theta[index] + half
+        return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
+
+
+def _turns(curve) -> bool:
+    return any(length > 0 and turn != "S" for turn, length in zip(curve.word, curve.lengths, strict=True))
+
+
+def _drive(path: Path) -> tuple[np.ndarray, np.ndarray, _Arcs]:
+    """Starts and ends of the curves, (n, 3) each, and all their arcs; a path without curves is one arc of length 0."""
+    signs = {"L": 1.0, "S": 0.0, "R": -1.0}
+    starts = np.array([curve.start for curve in path.curves]).reshape(-1, 3)
+    curvature = np.array([[signs[turn] / curve.radius for turn in curve.word] for curve in path.curves]).reshape(-1, 3)
+    length = np.array([curve.lengths for curve in path.curves]).reshape(-1, 3)
+    poses = [starts]
+    for arc in range(3):
+        one = _Arcs(*poses[-1].T, curvature[:, arc], length[:, arc])
+        poses.append(np.column_stack(one.at(np.arange(len(starts)), length[:, arc])))
+    if not path.curves:
+        x, y, theta = path.start
+        return starts, starts, _Arcs(*(np.array([value]) for value in (x, y, theta, 0.0, 0.0)))
+    begins = np.concatenate(poses[:3])
+    return starts, poses[3], _Arcs(*begins.T, curvature.T.ravel(), length.T.ravel())
+
+
+def _end_findings(path: Path, problem: Problem) -> list[str]:
+    findings = []
+    if path.start != problem.start:
+        findings.append(f"the path starts at {path.start}, not at {problem.start}")
+    off, turned = _apart(path.end, problem.goal)
+    if off > problem.goal_tolerance_xy + TOLERANCE or turned > problem.yaw_tolerance + TOLERANCE:
+        findings.append(f"the path ends {off:.6f} m and {turned:.6f} rad from the goal, whose tolerance is "
+                        f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad")
+    return findings
+
+
+def _joint_findings(path: Path, starts: np.ndarray, ends: np.ndarray) -> list[str]:
+    before = np.vstack([[path.start], ends])
+    after = np.vstack([starts, [path.end]])
+    findings = []
+    for i, (a, b) in enumerate(zip(before, after, strict=True)):
+        off, turned = _apart(a, b)
+        if not (off <= TOLERANCE and turned <= TOLERANCE):
+            findings.append(f"before curve {i} the path jumps by {off:.6g} m and {turned:.6g} rad at ({a[0]:.3f}, {a[1]:.3f})")
+    return findings
+
+
+def _turn_findings(path: Path, problem: Problem) -> list[str]:
+    least = problem.vehicle.turning_radius
+    findings = []
+    for i, curve in enumerate(path.curves):
+        if not curve.radius >= least * (1 - TOLERANCE):
+            findings.append(f"curve {i} turns with a radius of {curve.radius:g} m, tighter than {least:g} m")
+        if not all(length >= 0 and math.isfinite(length) for length in curve.lengths):
+            findings.append(f"curve {i} has the arc lengths {curve.lengths}")
+    return findings
+
+
+def _apart(a, b) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between two poses."""
+    return math.hypot(a[0] - b[0], a[1] - b[1]), abs(math.remainder(a[2] - b[2], math.tau))
+
+
+class _Obstacles:
+    """The true shapes of a map's obstacles."""
+
+    def __init__(self, inside: shapely.Geometry, solids: np.ndarray):
+        self._inside = inside
+        shapely.prepare(inside)
+        lines = shapely.get_parts(shapely.get_rings(shapely.get_parts(inside)))
+        corners = [shapely.get_coordinates(line) for line in lines]
+        edges = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in corners])
+        self._tree = shapely.STRtree(np.concatenate([shapely.linestrings(edges), solids]))
+
+    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Of points from the obstacles; 0 in one."""
+        _, distance = self._tree.query_nearest(shapely.points(x, y), return_distance=True, all_matches=False)
+        return np.where(shapely.contains_xy(self._inside, x, y), distance, 0.0)
+
+
+def _obstacles_of(problem: Problem) -> _Obstacles:
+    by_unknown = _judges.setdefault(problem.map, {})
+    if problem.allow_unknown not in by_unknown:
+        by_unknown[problem.allow_unknown] = (_grid_obstacles(problem.map, problem.allow_unknown)
+                                             if isinstance(problem.map, GridMap) else _Obstacles(problem.map.free, np.array([])))
+    return by_unknown[problem.allow_unknown]
+
+
+def _grid_obstacles(grid: GridMap, allow_unknown: bool) -> _Obstacles:
+    """The squares of occupied cells, those side by side in a row as one rectangle, and what is outside the grid."""
+    blocked = np.pad(grid.blocked(allow_unknown).astype(np.int8), ((0, 0), (1, 1)))
+    change = np.diff(blocked, axis=1)
+    row, left = np.nonzero(change == 1)
+    right = np.nonzero(change == -1)[1]
+    return _Obstacles(_rectangles(grid, 0, 0, *grid.data.shape[::-1]), _rectangles(grid, left, row, right, row + 1))
+
+
+def _rectangles(grid: GridMap, left, low, right, high) -> np.ndarray:
+    """Rectangles given in cells as polygons in the map's frame."""
+    x0, y0, yaw = grid.origin
+    corners = np.stack([np.stack([left, low], -1), np.stack([right, low], -1), np.stack([right, high], -1),
+                        np.stack([left, high], -1)], axis=-2) * grid.resolution
+    turned = corners[..., 0] + 1j * corners[..., 1]
+    turned = turned * np.exp(1j * yaw) + complex(x0, y0)
+    return shapely.polygons(np.stack([turned.real, turned.imag], axis=-1))
+
+
+def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[float, tuple[float, float]]:
+    """The least clearance and where it is; pieces are halved until none can hide contact or a clearance much less."""
+    pieces = np.maximum(np.ceil(arcs.length / FIRST_PIECE), 1).astype(int)
+    index = np.repeat(np.arange(len(pieces)), pieces)
+    nth = np.arange(len(index)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    size = (arcs.length / pieces)[index]
+    begin = nth * size
+
+    def clearance(s):
+        nonlocal least, where
+        x, y, _ = arcs.at(index, s)
+        found = obstacles.distance(x, y)
+        nearest = int(np.argmin(found))
+        if found[nearest] < least:
+            least, where = float(found[nearest]), (float(x[nearest]), float(y[nearest]))
+        return found
+
+    least, where = math.inf, (math.nan, math.nan)
+    at_begin, at_end = clearance(begin), clearance(begin + size)
+    while len(index) and least >= need - CONTACT:
+        bound = (at_begin + at_end - size) / 2
+        open_ = (bound < need - 2 * CONTACT) | (bound < least - PRECISION)
+        index, begin, size, at_begin, at_end = (a[open_] for a in (index, begin, size / 2, at_begin, at_end))
+        if len(index):
+            at_middle = clearance(begin + size)
+            begin = np.concatenate([begin, begin + size])
+            at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
+            index, size = np.tile(index, 2), np.tile(size, 2)
+    return least, where

@@ -1,0 +1,119 @@
+"""A Plan as a JSON document and back; its numbers read back bit for bit."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from dubins_rrt_ros import __version__
+
+from .dubins import WORDS, DubinsCurve
+from .map import Map
+from .options import options, values
+from .path import Path
+from .problem import Pose, Problem, checked_pose
+from .result import Plan
+from .settings import Settings
+from .vehicle import Vehicle
+
+
+class PlanFileError(ValueError):
+    """A document that holds no plan; the message says what is wrong with it."""
+
+
+def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
+    """`plan` as what JSON can hold.
+
+    Args:
+        plan: with a path or without: then length and its like are None, curves and poses empty.
+        map_name: the map as the user named it, to be found again when the request is planned again.
+    """
+    problem, settings, path = plan.problem, plan.settings, plan.path
+    return {
+        "error_code": int(plan.status), "error_name": plan.status.name, "message": plan.message,
+        "planner": settings.planner, "seed": settings.seed, "samples": int(plan.samples), "tree_nodes": len(plan.tree),
+        "time_to_first": _number(plan.time_to_first), "planning_time": _number(plan.planning_time),
+        "map_time": _number(plan.map_time), "length": _number(plan.length), "lower_bound": _number(plan.lower_bound),
+        "gap": _number(plan.gap), "min_clearance": _number(plan.min_clearance),
+        "max_curvature": _number(plan.max_curvature), "audit": plan.audit,
+        "curves": [_curve_document(curve) for curve in path.curves] if path else [],
+        "poses": path.poses(settings.path_spacing).tolist() if path else [],
+        "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
+        "vehicle": values(problem.vehicle), "settings": values(problem) | values(settings), "version": __version__,
+    }
+
+
+def _number(value: float | None) -> float | None:
+    """`value` as a float; None also for the infinite lower bound of an unreachable goal, which JSON cannot hold."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _curve_document(curve: DubinsCurve) -> dict[str, Any]:
+    return {"start": [float(c) for c in curve.start], "radius": float(curve.radius), "word": curve.word,
+            "lengths": [float(length) for length in curve.lengths]}
+
+
+def read_request(document: Mapping[str, Any], map: Map) -> tuple[Problem, Settings]:
+    """The request that a document answers, for planning it again on `map`.
+
+    The time limit is lifted to the largest allowed, and the sample budget is what was drawn: a deadline and a
+    cancellation only cut the sequence of samples short, so the same number of them gives the same path on a machine of
+    any speed. Where nothing was drawn, the budget stays as it was.
+
+    Raises:
+        PlanFileError: something is missing, or is of another type.
+        OptionError, InvalidPose: a value is out of range.
+    """
+    fields = dict(_field(document, "settings", Mapping))
+    vehicle = Vehicle(**_known(Vehicle, _field(document, "vehicle", Mapping), "vehicle"))
+    request = {item.name: fields.pop(item.name) for item in options(Problem) if item.name in fields}
+    problem = Problem(map, vehicle, checked_pose("start", _field(document, "start", list)),
+                      checked_pose("goal", _field(document, "goal", list)), **request)
+    fields = _known(Settings, fields, "settings")
+    limit = next(item.high for item in options(Settings) if item.name == "planning_time")
+    drawn = _field(document, "samples", int)
+    return problem, Settings(**fields | {"planning_time": limit, "samples": drawn or fields["samples"]})
+
+
+def read_path(document: Mapping[str, Any]) -> Path | None:
+    """The path in a document, or None where there is none.
+
+    Raises:
+        PlanFileError: something is missing, or is of another type.
+    """
+    poses = _field(document, "poses", list)
+    if not poses:
+        return None
+    curves = tuple(_read_curve(curve) for curve in _field(document, "curves", list))
+    return Path(_triple(poses[0], "poses"), _triple(poses[-1], "poses"), curves)
+
+
+def _read_curve(curve: Any) -> DubinsCurve:
+    if not isinstance(curve, Mapping):
+        raise PlanFileError("one of its curves is no object")
+    word = _field(curve, "word", str)
+    if word not in WORDS:
+        raise PlanFileError(f"one of its curves has the word {word!r}; there are {', '.join(WORDS)}")
+    return DubinsCurve(_triple(_field(curve, "start", list), "start"), _field(curve, "radius", float), word,
+                       _triple(_field(curve, "lengths", list), "lengths"))
+
+
+def _triple(numbers: Any, name: str) -> Pose:
+    if not (isinstance(numbers, list) and len(numbers) == 3 and all(isinstance(n, int | float) for n in numbers)):
+        raise PlanFileError(f"{name} holds {numbers!r} where three numbers are due")
+    return tuple(map(float, numbers))
+
+
+def _field(document: Mapping[str, Any], name: str, kind: type) -> Any:
+    if not isinstance(document.get(name), kind):
+        raise PlanFileError(f"its field {name} is missing or not of type {kind.__name__}; give a file that "
+                            "`dubins_rrt plan --json` wrote")
+    return document[name]
+
+
+def _known(cls: type, fields: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """`fields`, which must be exactly the options of `cls`."""
+    difference = {item.name for item in options(cls)} ^ set(fields)
+    if difference:
+        raise PlanFileError(f"its field {name} differs from what version {__version__} knows, in "
+                            f"{', '.join(sorted(difference))}; plan anew")
+    return dict(fields)

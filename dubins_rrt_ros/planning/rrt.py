@@ -1,0 +1,93 @@
+"""RRT and RRT*: Algorithms 1 and 2 of A. Khanal, RRT and RRT* Using Vehicle Dynamics, batch by batch.
+
+    all_links = [start]
+    while N != n_iter:
+        draw a random pose, sometimes the goal               Sampler.draw
+        find the closest link                                Grower.steer
+        steer along the Dubins curve towards the pose        Grower.steer
+        unless it collides, add it                           Grower.extend
+        RRT*: by the cheapest of the near links ...          Grower.choose_parent
+              ... and reroute those that gain by it          Grower.rewire
+
+The closest link is the one with the shortest Dubins curve to the pose. Near are the e (1 + 1/3) log n links with the shortest
+curves to it (the k-nearest RRT* of Karaman and Frazzoli, 2011, for three dimensions), and all within the longest of these
+curves' length from it.
+"""
+
+import math
+import time
+
+from ._kernels.grow import Grower
+from ._kernels.tree import SearchTree
+from .clearance import ClearanceField
+from .problem import Problem
+from .sampling import Sampler
+from .settings import Settings
+from .tree import Tree
+
+NEAR_FACTOR = math.e * (1 + 1 / 3)
+MOST_NEAR = 512
+#: Samples are drawn in blocks of this size, however many of them a batch then takes: the draws never depend on the time.
+BLOCK = 256
+#: About how long a batch takes [s]: so long does a cancellation wait.
+BATCH_TIME = 0.005
+
+
+class Search:
+    """A search under way.
+
+    Attributes:
+        samples: how many samples were used so far.
+        best: the node that reaches the goal at the least cost, or -1.
+    """
+
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField):
+        corners = problem.map.corners()
+        lowest, extent = corners.min(axis=0), corners.max(axis=0) - corners.min(axis=0)
+        vehicle = problem.vehicle
+        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent, settings.samples)
+        self._grower = Grower(self._tree, field.kernel, vehicle.robot_radius, settings.step_size, NEAR_FACTOR, MOST_NEAR,
+                              problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
+        self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
+        self._sampler = Sampler(problem, settings, field)
+        self._settings = settings
+        self._block = self._sampler.draw(0)
+        self._used = 0
+        self._batch = 8
+        self.samples = 0
+        self.best = -1
+
+    @property
+    def size(self) -> int:
+        """How many nodes the tree has."""
+        return self._tree.size
+
+    @property
+    def tree(self) -> Tree:
+        """A copy of the tree."""
+        return Tree.copy_of(self._tree)
+
+    @property
+    def length(self) -> float | None:
+        """Of the best path so far [m], or None."""
+        return self._tree.costs[self.best] if self.best >= 0 else None
+
+    @property
+    def done(self) -> bool:
+        """Whether the budget is used, or RRT has its path."""
+        return self.samples == self._settings.samples or (self.best >= 0 and self._settings.planner == "rrt")
+
+    def grow(self) -> None:
+        """Grow by a batch of samples, which ends early with the first path."""
+        if self._used == len(self._block):
+            self._block = self._sampler.draw(min(BLOCK, self._settings.samples - self.samples))
+            self._used = 0
+        begin, end = self._used, min(self._used + self._batch, len(self._block))
+        self._grower.reserve(end - begin)
+        started = time.perf_counter()
+        self._used = self._grow(self._block, begin, end)
+        took = time.perf_counter() - started
+        grown = self._used - begin
+        self.samples += grown
+        self.best = self._grower.best_goal_node()
+        self._batch = min(max(1, int(BATCH_TIME * grown / max(took, 1e-6))), 2 * self._batch, BLOCK)

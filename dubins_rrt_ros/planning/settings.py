@@ -1,0 +1,29 @@
+"""How to plan: one frozen dataclass whose fields are options."""
+
+from dataclasses import dataclass
+
+from .options import convert_options, option
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The planner's settings.
+
+    Raises:
+        OptionError: a field is of the wrong type or out of range.
+    """
+
+    planner: str = option("rrt_star", "the algorithm: rrt ends with its first path, rrt_star uses its whole budget",
+                          choices=("rrt", "rrt_star"))
+    samples: int = option(3000, "how many samples are drawn at most", low=1, high=10_000_000)
+    planning_time: float = option(1.0, "the time limit", unit="s", low=0.001, high=3600.0)
+    goal_bias: float = option(0.05, "the share of samples drawn at the goal", low=0.0, high=1.0)
+    step_size: float = option(0.0, "the longest new edge; 0 is unlimited", unit="m", low=0.0, high=1e6)
+    heading_sampling: str = option("uniform", "headings of the samples: uniform in [0, 2 pi), or goal, towards the goal",
+                                   choices=("uniform", "goal"))
+    path_spacing: float = option(0.05, "the largest distance between two poses of a published path", unit="m",
+                                 low=0.001, high=1000.0)
+    seed: int = option(-1, "the seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
+
+    def __post_init__(self):
+        convert_options(self)

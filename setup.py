@@ -1,0 +1,62 @@
+"""Metadata for pip and colcon alike: a [project] table in pyproject.toml would break `colcon build --symlink-install`."""
+
+from glob import glob
+
+from setuptools import Extension, find_packages, setup
+
+PACKAGE = "dubins_rrt_ros"
+KERNELS = f"{PACKAGE}/planning/_kernels"
+
+
+def compiled_kernels():
+    """The keyword arguments that compile the kernels, where Cython is at hand; without it they run interpreted.
+
+    Cython's build_ext translates when it builds: cythonize() here would print to standard output, which colcon reads.
+    """
+    try:
+        from Cython.Distutils import build_ext
+    except ImportError:
+        return {}
+    extensions = [
+        Extension(path[:-3].replace("/", "."), [path], optional=True, extra_compile_args=["-O3", "-ffp-contract=off"])
+        for path in sorted(glob(f"{KERNELS}/[a-z]*.py"))
+    ]
+    return {"ext_modules": extensions, "cmdclass": {"build_ext": build_ext}}
+
+
+def installed(folder, *patterns):
+    """A data_files entry that installs files of the source tree into the package's share folder."""
+    return f"share/{PACKAGE}/{folder}".rstrip("/"), sorted(path for pattern in patterns for path in glob(pattern))
+
+
+ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
+TEST = ["pytest>=7.4", "hypothesis>=6.98", "import-linter>=2.0", "ruff>=0.6"]
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Dubins RRT and RRT* for ROS 2: collision-free paths for vehicles that cannot turn on the spot",
+    author="dubins_rrt_ros maintainers",
+    license="Apache-2.0",
+    python_requires=">=3.11",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={f"{PACKAGE}.planning._kernels": ["*.pxd"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        installed("", "package.xml"),
+        installed("maps", "maps/*"),
+        # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
+        (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt"]),
+    ],
+    install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0",
+                      "matplotlib>=3.6", "tqdm>=4.64"],
+    extras_require={"ros": ROS, "test": TEST},
+    entry_points={
+        "console_scripts": [
+            f"planner = {PACKAGE}.node.planner_node:main",
+            f"dubins_rrt = {PACKAGE}.cli.main:main",
+        ],
+    },
+    zip_safe=False,
+    **compiled_kernels(),
+)

@@ -1,0 +1,129 @@
+"""GridMap, PolygonMap and rasterise."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dubins_rrt_ros.planning.map import FREE, OCCUPIED, GridMap, MapError, PolygonMap, rasterise
+
+coordinates = st.floats(-1e3, 1e3)
+
+
+def test_cells_of_a_grid_are_small_and_read_only():
+    grid = GridMap([[0, 100, -1]], 1)
+    assert grid.data.dtype == np.int8
+    assert grid.size == (3, 1)
+    with pytest.raises(ValueError, match="read-only"):
+        grid.data[0, 0] = 5
+
+
+@pytest.mark.parametrize("allow_unknown, expected", [
+    (False, [False, False, True, True, True, True, True]), (True, [False, False, False, False, True, True, False])])
+def test_blocked(allow_unknown, expected):
+    assert GridMap([[0, 25, 26, 64, 65, 100, -1]], 1.0).blocked(allow_unknown).tolist() == [expected]
+
+
+def test_frames_of_a_turned_grid():
+    grid = GridMap(np.zeros((2, 4)), 0.5, (1, 2, math.pi / 2))
+    np.testing.assert_allclose(grid.corners(), [[1, 2], [1, 4], [0, 4], [0, 2]], atol=1e-15)
+    np.testing.assert_allclose(grid.to_map_frame([[2, 0], [0, 1]]), [[1, 4], [0, 2]], atol=1e-15)
+    np.testing.assert_allclose(grid.to_grid_frame([0, 4]), [2, 1], atol=1e-15)
+
+
+@given(coordinates, coordinates, st.floats(-10, 10), coordinates, coordinates)
+def test_frames_are_inverse_and_rigid(x, y, yaw, px, py):
+    grid = GridMap([[0]], 1.0, (x, y, yaw))
+    there = grid.to_map_frame(np.array([px, py]))
+    assert math.dist(there, (x, y)) == pytest.approx(math.hypot(px, py), abs=1e-9)
+    np.testing.assert_allclose(grid.to_grid_frame(there), [px, py], atol=1e-9)
+
+
+@pytest.mark.parametrize("changes, word", [
+    ({"data": np.zeros((0, 3))}, "cells"), ({"data": np.zeros(3)}, "cells"), ({"resolution": 0}, "resolution"),
+    ({"resolution": math.nan}, "resolution"), ({"resolution": math.inf}, "resolution"),
+    ({"origin": (0, math.nan, 0)}, "origin")])
+def test_bad_grid(changes, word):
+    with pytest.raises(MapError, match=f"^yard: .*{word}.*; ?.*"):
+        GridMap(**{"data": [[0]], "resolution": 1.0, "name": "yard", **changes})
+
+
+def test_id_of_a_grid_is_that_of_its_content():
+    grid = GridMap([[0, 1]], 0.5, (1, 2, 3), "a")
+    assert grid.id == GridMap(np.array([[0, 1]], np.int64), 0.5, (1.0, 2.0, 3.0), "b").id
+    others = [GridMap([[0, 2]], 0.5, (1, 2, 3)), GridMap([[0], [1]], 0.5, (1, 2, 3)),
+              GridMap([[0, 1]], 0.25, (1, 2, 3)), GridMap([[0, 1]], 0.5, (1, 2, 3.5))]
+    assert len({grid.id, *(other.id for other in others)}) == 5
+
+
+def test_id_of_polygons_is_that_of_their_content():
+    assert PolygonMap(shapely.box(0, 0, 1, 1), "a").id == PolygonMap(shapely.box(0, 0, 1, 1), "b").id
+    assert PolygonMap(shapely.box(0, 0, 1, 1)).id != PolygonMap(shapely.box(0, 0, 1, 2)).id
+
+
+def test_corners_of_polygons():
+    assert PolygonMap(shapely.box(1, 2, 4, 8)).corners().tolist() == [[1, 2], [4, 2], [4, 8], [1, 8]]
+
+
+@pytest.mark.parametrize("free", [
+    shapely.Point(0, 0), shapely.Polygon(), shapely.LineString([(0, 0), (1, 1)]),
+    shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])])
+def test_bad_polygons(free):
+    with pytest.raises(MapError, match="^yard: .*free space"):
+        PolygonMap(free, "yard")
+
+
+def naive_rasterise(polygons, resolution):
+    """The same by the area of what is free in every cell."""
+    x0, y0, x1, y1 = polygons.free.bounds
+    columns, rows = round((x1 - x0) / resolution) + 2, round((y1 - y0) / resolution) + 2
+    data = np.empty((rows, columns), int)
+    for row in range(rows):
+        for column in range(columns):
+            x, y = x0 + (column - 1) * resolution, y0 + (row - 1) * resolution
+            free = polygons.free.intersection(shapely.box(x, y, x + resolution, y + resolution)).area
+            data[row, column] = FREE if free > resolution**2 * (1 - 1e-6) else OCCUPIED
+    return data
+
+
+# Sixteenths, so that the cells' borders are exact and an obstacle that meets a cell takes a real part of it.
+sixteenths = st.integers(1, 63).map(lambda number: number / 16)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(sixteenths, sixteenths, sixteenths, sixteenths), max_size=4))
+def test_rasterise_agrees_with_the_naive_way(obstacles):
+    boxes = [shapely.box(min(a, c), min(b, d), max(a, c), max(b, d)) for a, b, c, d in obstacles if a != c and b != d]
+    polygons = PolygonMap(shapely.box(0, 0, 4, 4) - shapely.union_all(boxes), "yard")
+    grid = rasterise(polygons, 0.25)
+    assert grid.data.tolist() == naive_rasterise(polygons, 0.25).tolist()
+    x0, y0, _, _ = polygons.free.bounds
+    assert grid.origin == (x0 - 0.25, y0 - 0.25, 0)
+    assert (grid.resolution, grid.name) == (0.25, "yard")
+
+
+def test_rasterise_of_a_slanted_obstacle_never_frees_what_is_occupied():
+    polygons = PolygonMap(shapely.box(0, 0, 3, 2) - shapely.Polygon([(0.5, 0.5), (2.3, 0.9), (1.1, 1.7)]))
+    grid = rasterise(polygons, 0.1)
+    assert grid.data.shape == (22, 32)
+    points = np.random.default_rng(1).uniform((-0.2, -0.2), (3.2, 2.2), (5000, 2))
+    columns, rows = np.floor(grid.to_grid_frame(points) / 0.1).astype(int).T
+    inside = (rows >= 0) & (rows < 22) & (columns >= 0) & (columns < 32)
+    free_cell = np.zeros(len(points), bool)
+    free_cell[inside] = grid.data[rows[inside], columns[inside]] == FREE
+    free_point = shapely.intersects_xy(polygons.free, points)
+    assert not (free_cell & ~free_point).any()
+    # Only cells that the border meets are lost.
+    lost = shapely.distance(shapely.points(points[free_point & ~free_cell]), polygons.free.boundary)
+    assert lost.max() <= 0.1 * math.sqrt(2)
+
+
+def test_rasterise_surrounds_the_map_and_rounds_its_size_up():
+    data = rasterise(PolygonMap(shapely.box(0, 0, 1.05, 0.95)), 0.1).data
+    assert data.shape == (12, 13)
+    assert (data[[0, -1]] == OCCUPIED).all()
+    assert (data[:, [0, -1, -2]] == OCCUPIED).all()
+    assert (data[1:10, 1:11] == FREE).all()

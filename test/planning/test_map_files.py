@@ -1,0 +1,293 @@
+"""Map files: map_server's fields by Jazzy's rules, saving, the shipped maps; a helpful line for every bad file."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from dubins_rrt_ros.planning.map import GridMap, MapError, PolygonMap, rasterise
+from dubins_rrt_ros.planning.map_files import load_map, save_map
+
+MAPS = Path(__file__).parents[2] / "maps"
+FIELDS = {"image": "m.pgm", "resolution": "0.05", "origin": "[0, 0, 0]", "negate": "0",
+          "occupied_thresh": "0.65", "free_thresh": "0.196"}
+REMEDIES = ("give", "save", "correct", "name ", "make", "convert", "crop", "copy", "split", "mark", "choose")
+fuzz = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def yaml_of(fields):
+    return "".join(f"{key}: {value}\n" for key, value in fields.items() if value is not None)
+
+
+def pgm(rows):
+    rows = np.asarray(rows)
+    return b"P5\n%d %d\n255\n" % (rows.shape[1], rows.shape[0]) + rows.astype("u1").tobytes()
+
+
+def write_grid(folder, rows=((254, 0, 205),), name="m.pgm", **changes):
+    """Write a pair and return the YAML's path; a field that is changed to None is left out."""
+    (folder / name).write_bytes(pgm(rows))
+    (folder / "m.yaml").write_text(yaml_of({**FIELDS, "image": name, **changes}), "utf-8")
+    return folder / "m.yaml"
+
+
+def refusal(path, **options):
+    """The message of a refusal, that must be one printable line with the file's name and a remedy."""
+    with pytest.raises(MapError) as caught:
+        load_map(path, **options)
+    message = str(caught.value)
+    assert message.isprintable()
+    assert message.startswith(f"{path}: ")
+    assert any(word in message.split("; ")[-1] for word in REMEDIES), message
+    return message
+
+
+def test_first_image_row_is_the_top_of_the_map(tmp_path):
+    grid = load_map(write_grid(tmp_path, [[254, 254, 0], [205, 254, 254]]))
+    assert isinstance(grid, GridMap)
+    assert grid.data.tolist() == [[-1, 0, 0], [0, 0, 100]]
+    assert (grid.name, grid.resolution, grid.origin) == ("m.yaml", 0.05, (0, 0, 0))
+
+
+def test_origin_with_yaw_places_the_cells(tmp_path):
+    grid = load_map(write_grid(tmp_path, resolution="1e-1", origin=f"[1, 2, {np.pi / 2!r}]"))
+    assert grid.origin == (1, 2, np.pi / 2)
+    assert grid.resolution == 0.1
+    np.testing.assert_allclose(grid.to_map_frame(np.array([0.3, 0.1])), [0.9, 2.3])
+
+
+@pytest.mark.parametrize("thresh, expected", [("0.25", 0), ("0.196", -1)])
+def test_grey_205_is_free_above_its_threshold(tmp_path, thresh, expected):
+    assert load_map(write_grid(tmp_path, [[205]], free_thresh=thresh)).data[0, 0] == expected
+
+
+def test_both_thresholds_are_inclusive(tmp_path):
+    path = write_grid(tmp_path, [[0, 1, 254, 255]], occupied_thresh="1.0", free_thresh="0.0")
+    assert load_map(path).data.tolist() == [[100, -1, -1, 0]]
+
+
+@pytest.mark.parametrize("negate, expected", [
+    ("0", [100, 0]), ("1", [0, 100]), ("true", [0, 100]), ("False", [100, 0]), ("yes", [0, 100]), ("off", [100, 0])])
+def test_negate(tmp_path, negate, expected):
+    assert load_map(write_grid(tmp_path, [[0, 255]], negate=negate)).data.tolist() == [expected]
+
+
+def test_scale_at_values_worked_out_by_hand(tmp_path):
+    # 1 - 102/255 = 0.6 is (0.6 - 0.2) / 0.6 = 66.7 % of the way between the thresholds, 1 - 153/255 = 0.4 is 33.3 %.
+    path = write_grid(tmp_path, [[0, 40, 102, 153, 215, 255]], mode="Scale", occupied_thresh="0.8", free_thresh="0.2")
+    assert load_map(path).data.tolist() == [[100, 100, 67, 33, 0, 0]]
+
+
+def test_scale_of_every_brightness(tmp_path):
+    grey = np.arange(256)
+    path = write_grid(tmp_path, [grey], mode="scale", negate="1", occupied_thresh="0.9", free_thresh="0.1")
+    expected = np.clip(np.floor((grey / 255 - 0.1) / 0.8 * 100 + 0.5), 0, 100)
+    off = np.abs(load_map(path).data[0] - expected)
+    # Single precision may round a value that lies on a half to the other side.
+    assert off.max() <= 1
+    assert (off > 0).sum() <= 5
+
+
+def test_raw_takes_the_value_and_ignores_negate_and_thresholds(tmp_path):
+    path = write_grid(tmp_path, [[0, 1, 65, 100, 101, 127, 128, 205, 255]], mode="RAW", negate="1")
+    assert load_map(path).data.tolist() == [[0, 1, 65, 100, -1, -1, -1, -1, -1]]
+
+
+@pytest.mark.parametrize("mode, expected", [
+    ("trinary", [100, -1, -1]), ("scale", [100, -1, 0]), ("raw", [0, 50, -1])])
+def test_transparency_is_unknown_but_in_raw(tmp_path, mode, expected):
+    path = write_grid(tmp_path, name="m.png", mode=mode, free_thresh="0.1")
+    image = Image.new("LA", (3, 1))
+    image.putdata([(0, 255), (50, 254), (254, 255 if mode == "scale" else 0)])
+    image.save(tmp_path / "m.png")
+    assert load_map(path).data.tolist() == [expected]
+
+
+def test_scalars_are_read_as_map_server_reads_them(tmp_path):
+    # YAML 1.1 would read text, a number, eight, and nothing that map_server knows.
+    path = write_grid(tmp_path, name="2024", resolution="5e-2", origin="['-1e1', +2, 010]", negate="'0'", other="[]")
+    grid = load_map(path)
+    assert (grid.resolution, grid.origin) == (0.05, (-10, 2, 10))
+
+
+def test_image_by_absolute_name(tmp_path):
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images/a b.pgm").write_bytes(pgm([[0]]))
+    (tmp_path / "m.yml").write_text("\ufeff" + yaml_of({**FIELDS, "image": f'"{tmp_path}/images/a b.pgm"'}), "utf-8")
+    assert load_map(str(tmp_path / "m.yml")).data.tolist() == [[100]]
+
+
+def test_home_directory(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    write_grid(tmp_path)
+    assert load_map("~/m.yaml").data.shape == (1, 3)
+
+
+@pytest.mark.parametrize("ending", ["geojson", "json", "GeoJSON", "wkt", "WKT"])
+def test_polygons_by_their_ending(tmp_path, ending):
+    path = tmp_path / f"yard.{ending}"
+    ring = [[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
+    geometry = {"type": "Polygon", "coordinates": [ring]}
+    text = json.dumps({"type": "Feature", "properties": {"role": "bounds"}, "geometry": geometry})
+    path.write_text("POLYGON ((0 0, 2 0, 2 2, 0 2, 0 0))" if ending.lower() == "wkt" else text)
+    yard = load_map(path)
+    assert isinstance(yard, PolygonMap)
+    assert (yard.name, yard.free.area) == (path.name, 4)
+
+
+@pytest.mark.parametrize("field, values", [
+    ("image", [None, "", "[a]", "no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', "m.yaml", '"' + 300 * "n" + '"']),
+    ("resolution", [None, "", "0", "-0.05", ".nan", "nan", "inf", "1e999", "five", "[0.05]"]),
+    ("origin", [None, "", "0", "000", "[0, 0]", "[0, 0, 0, 0]", "[0, nan, 0]", "[0, 0, x]", "[[0], 0, 0]", "{x: 1}"]),
+    ("negate", [None, "2", "maybe", "[]", ""]),
+    ("occupied_thresh", [None, "1.1", "65", "nan", "0.1", "[]"]),
+    ("free_thresh", [None, "-0.1", "low", "0.65", "0.9"]),
+    ("mode", ["binary", '""', "[raw]", "{}"]),
+])
+def test_bad_field(tmp_path, field, values):
+    for value in values:
+        message = refusal(write_grid(tmp_path, **{field: value}) if field != "image" else image_named(tmp_path, value))
+        assert field in message, value
+
+
+def image_named(folder, value):
+    path = write_grid(folder)
+    path.write_text(yaml_of({**FIELDS, "image": value}), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("content, word", [
+    (b"", "empty"), (b" \n", "empty"), (b"\xff\xfe", "UTF-8"), (b"a: [", "YAML"), (b"- 1\n- 2\n", "YAML"),
+    (b"text", "YAML"), (b"a: 1\n---\nb: 2\n", "YAML"), (b"a: \x01", "YAML"), (b"*x", "YAML"), (b"? [a]\n: 1", "YAML"),
+    (b"[" * 5000, "YAML"), (b'a: "\\U7fffffff"', "YAML"), (b"!!python/object/apply:os.getcwd []", "YAML"),
+    (b"#" * 2**21, "bytes"), (b"&a [*a]", "YAML"), (b"origin: &a [*a, *a, *a]\nimage: m.pgm\nresolution: 1", "origin"),
+])
+def test_bad_yaml(tmp_path, content, word):
+    (tmp_path / "bad.yaml").write_bytes(content)
+    assert word in refusal(tmp_path / "bad.yaml")
+
+
+@pytest.mark.parametrize("content, word", [
+    (b"", "empty"), (b"hello", "PGM"), (pgm([[1, 2]])[:-1], "truncated"), (b"P5 30000 30000 255\n", "max_map_cells"),
+    (b"\x89PNG\r\n\x1a\n", "damaged")])
+def test_bad_image_names_the_field_and_the_image(tmp_path, content, word):
+    path = write_grid(tmp_path)
+    (tmp_path / "m.pgm").write_bytes(content)
+    message = refusal(path)
+    assert "image 'm.pgm' " in message
+    assert word in message
+
+
+def test_size_limit_is_inclusive(tmp_path):
+    path = write_grid(tmp_path)
+    assert load_map(path, max_map_cells=3).data.shape == (1, 3)
+    assert "3 x 1 = 3 cells, above max_map_cells = 2; crop it" in refusal(path, max_map_cells=2)
+
+
+def test_bad_polygons_name_the_file(tmp_path):
+    (tmp_path / "bad.wkt").write_text("POLYGON ((0 0, 1 1))")
+    assert "geometry" in refusal(tmp_path / "bad.wkt")
+    name = "a\nb\u2028\x1b[31m\ud800"
+    feature = {"type": "Feature", "properties": {"name": name}, "geometry": None}
+    (tmp_path / "bad.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    assert "feature 1 ('a" in refusal(tmp_path / "bad.geojson")
+
+
+def test_long_polygon_files_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.map_files.MAX_POLYGON_BYTES", 50)
+    (tmp_path / "m.geojson").write_text(" " * 51)
+    assert "larger than 50 bytes" in refusal(tmp_path / "m.geojson")
+
+
+@pytest.mark.parametrize("name, word", [
+    ("no.yaml", "No such file"), ("folder.yaml", "directory"), ("m.pgm/m.wkt", "Not a directory"),
+    ("map.txt", "ending"), ("map", "ending"), ("n" * 300 + ".wkt", "too long")])
+def test_files_that_are_none(tmp_path, name, word):
+    write_grid(tmp_path)
+    (tmp_path / "folder.yaml").mkdir()
+    assert word in refusal(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["nul\0.wkt", "two\nlines\x1b[0m.yaml", "\ud800.json", ""])
+def test_odd_names_give_one_line(name):
+    with pytest.raises(MapError, match="correct|give") as caught:
+        load_map(name)
+    assert str(caught.value).isprintable()
+
+
+def test_save_and_load_give_the_same_map(tmp_path):
+    data = np.random.default_rng(3).choice([0, 100, -1], (7, 5)).astype(np.int8)
+    grid = GridMap(data, 1 / 30, (-1e-7, 12345.678901234567, 0.1), "any")
+    save_map(grid, tmp_path / "näme: 1.yaml")
+    assert load_map(tmp_path / "näme: 1.yaml").id == grid.id
+    assert (tmp_path / "näme: 1.pgm").read_bytes().startswith(b"P5\n5 7\n255\n")
+
+
+def test_saved_cells_keep_what_they_mean(tmp_path):
+    grid = GridMap(np.array([[0, 25, 26, 64, 65, 100, -1]]), 1.0)
+    save_map(grid, tmp_path / "m.yml")
+    again = load_map(tmp_path / "m.yml")
+    assert again.data.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
+    for allow_unknown in (False, True):
+        assert (again.blocked(allow_unknown) == grid.blocked(allow_unknown)).all()
+
+
+@pytest.mark.parametrize("name", ["m.pgm", "m", "no/m.yaml"])
+def test_save_refuses_a_bad_name(tmp_path, name):
+    with pytest.raises(MapError, match="choose|name it") as caught:
+        save_map(GridMap(np.zeros((1, 1)), 1.0), tmp_path / name)
+    assert name in str(caught.value)
+
+
+def load_or_refuse(path):
+    try:
+        assert isinstance(load_map(path, max_map_cells=10_000), GridMap | PolygonMap)
+    except MapError as error:
+        assert str(error).isprintable()
+
+
+odd = ["nan", "1e400", "-1", "0x1p3", "!!int a", "&a", "*a", "[", "{", "'", "~"]
+texts = st.text(max_size=8) | st.sampled_from(odd)
+
+
+@fuzz
+@given(st.dictionaries(st.sampled_from([*FIELDS, "mode"]), texts, max_size=3))
+def test_any_field(tmp_path, changes):
+    (tmp_path / "m.pgm").write_bytes(pgm([[0]]))
+    (tmp_path / "m.yaml").write_bytes(yaml_of({**FIELDS, **changes}).encode("utf-8", "surrogatepass"))
+    load_or_refuse(tmp_path / "m.yaml")
+
+
+@fuzz
+@given(st.sampled_from(["m.yaml", "m.json", "m.wkt"]), st.binary(max_size=60), st.integers(0, 110), st.integers(0, 9))
+def test_any_bytes(tmp_path, name, content, at, cut):
+    write_grid(tmp_path)
+    seed = (tmp_path / "m.yaml").read_bytes()
+    for mutated in (content, seed[:at] + content + seed[at + cut:]):
+        (tmp_path / name).write_bytes(mutated)
+        load_or_refuse(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["block", "maze", "forest"])
+def test_shipped_pair_is_the_rendering_of_the_polygons(name, tmp_path):
+    grid = rasterise(load_map(MAPS / f"{name}.geojson"), 0.05)
+    assert load_map(MAPS / f"{name}.yaml").id == grid.id
+    save_map(grid, tmp_path / f"{name}.yaml")
+    for file in (f"{name}.yaml", f"{name}.pgm"):
+        assert (tmp_path / file).read_bytes() == (MAPS / file).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["block", "maze", "forest"])
+def test_shipped_start_and_goal_fit_a_robot_and_have_no_straight_way(name):
+    members = json.loads((MAPS / f"{name}.geojson").read_text("utf-8"))
+    start, goal = members["start"], members["goal"]
+    room = load_map(MAPS / f"{name}.geojson").free.buffer(-0.2)
+    assert room.geom_type == "Polygon"
+    assert all(shapely.intersects_xy(room, *pose[:2]) for pose in (start, goal))
+    assert not shapely.covers(room, shapely.linestrings([start[:2], goal[:2]]))
+    assert all(item["properties"]["name"] for item in members["features"])

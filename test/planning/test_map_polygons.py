@@ -1,0 +1,191 @@
+"""GeoJSON and WKT: what is free, and that every bad ring is named and refused."""
+
+import json
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dubins_rrt_ros.planning.map import MapError, PolygonMap
+from dubins_rrt_ros.planning.map_polygons import parse_geojson, parse_wkt
+
+SQUARE = [[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]
+POST = [[4, 4], [6, 4], [6, 6], [4, 6], [4, 4]]
+fuzz = settings(max_examples=300, deadline=None)
+
+
+def feature(rings, kind="Polygon", **properties):
+    return {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": rings}}
+
+
+BOUNDS = feature([SQUARE], role="bounds", name="yard")
+
+
+def collection(*features):
+    return json.dumps({"type": "FeatureCollection", "features": features})
+
+
+def free_space(*features):
+    return parse_geojson(collection(*features), "yard.geojson").free
+
+
+def test_free_space_is_the_bounds_less_the_obstacles():
+    corner = [[9, 9], [12, 9], [12, 12], [9, 12], [9, 9]]
+    yard = parse_geojson(collection(feature([POST], name="post"), BOUNDS, feature([corner])), "yard.geojson")
+    assert isinstance(yard, PolygonMap)
+    assert yard.name == "yard.geojson"
+    assert yard.free.area == pytest.approx(100 - 4 - 1)
+    assert not shapely.intersects_xy(yard.free, 5, 5)
+
+
+def test_a_hole_in_an_obstacle_is_free():
+    hole = [[4.5, 4.5], [5.5, 4.5], [5.5, 5.5], [4.5, 5.5], [4.5, 4.5]]
+    free = free_space(BOUNDS, feature([POST, hole]))
+    assert free.area == pytest.approx(100 - 4 + 1)
+    assert shapely.intersects_xy(free, 5, 5)
+
+
+def test_a_hole_in_the_bounds_is_occupied():
+    assert free_space(feature([SQUARE, POST], role="bounds")).area == pytest.approx(96)
+
+
+def test_multipolygons_overlaps_and_heights():
+    far = [[x + 20, y, 7.5] for x, y in SQUARE]
+    bounds = feature([[SQUARE], [far]], "MultiPolygon", role="bounds")
+    shifted = [[x + 1, y] for x, y in POST]
+    assert free_space(bounds, feature([POST]), feature([shifted])).area == pytest.approx(194)
+
+
+def test_a_lone_feature_and_unknown_members():
+    assert parse_geojson(json.dumps({**BOUNDS, "start": [1, 2, 3], "bbox": None}), "m").free.area == pytest.approx(100)
+
+
+def test_any_other_role_and_missing_properties_are_obstacles():
+    bare = {"type": "Feature", "properties": None, "geometry": feature([POST])["geometry"]}
+    assert free_space(BOUNDS, bare).area == free_space(BOUNDS, feature([POST], role="Bounds")).area == pytest.approx(96)
+
+
+TIE = [[0, 0], [1, 1], [1, 0], [0, 1], [0, 0]]
+
+
+def triangle(second):
+    return feature([[[0, 0], second, [1, 1], [0, 0]]])
+
+
+@pytest.mark.parametrize("text, words", [
+    ("{", ["JSON"]), ("[" * 100000, ["JSON"]), ("1" * 5000, ["JSON"]), ("[]", ["type"]), ("null", ["type"]),
+    ('{"type": "Polygon", "coordinates": []}', ["type", "Polygon"]),
+    ('{"type": "FeatureCollection"}', ["features"]), ('{"type": "FeatureCollection", "features": {}}', ["features"]),
+    (collection(), ["0 features", "bounds"]), (collection(feature([POST])), ["0 features", "bounds"]),
+    (collection(BOUNDS, BOUNDS), ["2 features", "bounds", "feature 1 ('yard'), feature 2 ('yard')"]),
+])
+def test_bad_collection(text, words):
+    check_refusal(text, words)
+
+
+@pytest.mark.parametrize("second, words", [
+    (7, ["feature 2"]), ({"type": "Polygon"}, ["feature 2", "Feature"]),
+    ({"type": "Feature", "id": "t9", "geometry": None}, ["feature 2 ('t9')", "geometry"]),
+    (feature([0, 0], "Point", name="lamp"), ["feature 2 ('lamp')", "Point"]),
+    (feature([], name="tree"), ["feature 2 ('tree')", "coordinates"]),
+    (feature(5), ["coordinates"]), (feature({}), ["coordinates"]),
+    (feature([[]]), ["feature 2, ring 1", "0 positions"]),
+    (feature([POST[:3]]), ["ring 1", "3 positions"]), (feature(["abcde"]), ["ring 1", "abcde"]),
+    (feature([POST[:-1]], id=4), ["feature 2 (4), ring 1", "not closed"]),
+    (feature([TIE], name="tie"), ["feature 2 ('tie'), ring 1", "Self-intersection"]),
+    (feature([[[1, 1]] * 5]), ["ring 1", "not valid"]), (feature([SQUARE, POST[:-1]]), ["ring 2", "not closed"]),
+    (feature([SQUARE, TIE]), ["ring 2", "Self-intersection"]), (feature([POST, SQUARE]), ["feature 2", "not valid"]),
+    (feature([[SQUARE], [POST]], "MultiPolygon"), ["feature 2", "not valid"]),
+    (feature([[POST], [SQUARE[:2]]], "MultiPolygon"), ["polygon 2, ring 1", "2 positions"]),
+    (feature([[POST], 3], "MultiPolygon"), ["polygon 2", "coordinates"]),
+    (triangle([1, float("nan")]), ["feature 2, ring 1: position 2", "nan"]),
+    (triangle([1, float("inf")]), ["position 2", "inf"]), (triangle([1, -1e10]), ["position 2", "-10000000000.0"]),
+    (triangle([1, "2"]), ["position 2", "'2'"]), (triangle([1, True]), ["position 2", "True"]),
+    (triangle([1]), ["position 2"]),
+    (triangle([1, 10**400]), ["position 2"]), (triangle(None), ["position 2", "None"]),
+    (feature([SQUARE]), ["features", "no free space"]),
+])
+def test_bad_feature(second, words):
+    check_refusal(collection(BOUNDS, second), words)
+
+
+def check_refusal(text, words):
+    with pytest.raises(MapError) as caught:
+        parse_geojson(text, "bad.geojson")
+    message = str(caught.value)
+    assert [word for word in words if word not in message] == []
+    assert any(remedy in message.split("; ")[-1] for remedy in ("give", "correct", "mend", "mark", "repeat", "move"))
+
+
+@pytest.mark.parametrize("text, area", [
+    ("POLYGON ((0 0, 10 0, 10 10, 0 10, 0 0), (4 4, 6 4, 6 6, 4 6, 4 4))", 96),
+    ("\n multipolygon z (((0 0 1, 1 0 1, 1 1 1, 0 0 1)), ((2 0 1, 3 0 1, 3 1 1, 2 0 1)))\n", 1),
+])
+def test_wkt(text, area):
+    yard = parse_wkt(text, "yard.wkt")
+    assert (yard.name, yard.free.area, shapely.has_z(yard.free)) == ("yard.wkt", area, False)
+
+
+@pytest.mark.parametrize("text, word", [
+    ("POINT (0 0)", "POINT"), ("hello", "hello"), ("LINESTRING (0 0, 1 1)", "POLYGON"),
+    ("GEOMETRYCOLLECTION (" * 9000, "POLYGON"), ("POLYGON", "valid"), ("POLYGON EMPTY", "empty"),
+    ("MULTIPOLYGON EMPTY", "empty"), ("POLYGON ((0 0, 1 0, 1 1))", "valid"),
+    ("POLYGON ((0 0, 1 0, 1 1, 0 1))", "closed"), ("POLYGON ((0 0, 2e9 0, 1 1, 0 0))", "2000000000.0"),
+    ("POLYGON ((0 0, 1 0", "valid"), ("POLYGON ((0 0, 1 1, 1 0, 0 1, 0 0))", "Self-intersection"),
+    ("POLYGON ((0 0, nan 0, 1 1, 0 0))", "nan"), ("POLYGON ((0 0, inf 0, 1 1, 0 0))", "inf"),
+    ("POLYGON ((0 0, 1 x, 1 1, 0 0))", "valid"),
+    ("POLYGON ((0 0, 9 0, 9 9, 0 0)) POLYGON ((0 0, 9 0, 9 9, 0 0))", "followed by 'POLYGON"),
+    ("POLYGON ((0 0, 9 0, 9 9, 0 0)) ((0 0, 9 0, 9 9, 0 0))", "followed by '(("),
+    ("POLYGON ((0 0, 9 0, 9 9, 0 0));", "followed by ';'"),
+    ("MULTIPOLYGON (((0 0, 9 0, 9 9, 0 0)), ((0 0, 9 0, 9 9, 0 0)))", "not valid"),
+])
+def test_bad_wkt(text, word):
+    with pytest.raises(MapError) as caught:
+        parse_wkt(text, "bad.wkt")
+    message = str(caught.value)
+    assert message.startswith("geometry ")
+    assert word in message
+    assert any(remedy in message.split("; ")[-1] for remedy in ("give", "correct", "mend"))
+
+
+def parse_or_refuse(parse, text):
+    try:
+        assert shapely.is_valid(parse(text, "any").free)
+    except MapError as error:
+        assert "; " in str(error)
+
+
+def mutations(seed):
+    """Copies of a text with a slice replaced."""
+    return st.builds(lambda at, cut, new: seed[:at] + new + seed[at + cut:],
+                     st.integers(0, len(seed)), st.integers(0, 12), st.text(max_size=8))
+
+
+scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3)
+values = st.recursive(scalars, lambda inner: st.lists(inner, max_size=5) | st.dictionaries(st.text(max_size=3), inner))
+numbers = st.floats() | st.integers(-20, 20)
+
+
+def closed_rings(number):
+    return st.lists(st.lists(number, min_size=2, max_size=2), min_size=3, max_size=8).map(lambda ring: [*ring, ring[0]])
+
+
+@fuzz
+@given(st.one_of(
+    values.map(json.dumps),
+    values.map(lambda value: collection(BOUNDS, value)),
+    values.map(lambda value: collection(BOUNDS, feature(value))),
+    st.lists(closed_rings(numbers), max_size=3).map(lambda value: collection(BOUNDS, feature(value))),
+    st.lists(closed_rings(st.integers(-3, 13)), max_size=2).map(lambda value: collection(BOUNDS, feature(value))),
+    st.lists(st.lists(closed_rings(numbers), max_size=2)).map(lambda v: collection(BOUNDS, feature(v, "MultiPolygon"))),
+    mutations(collection(BOUNDS, feature([POST])))))
+def test_any_geojson(text):
+    parse_or_refuse(parse_geojson, text)
+
+
+@fuzz
+@given(mutations("MULTIPOLYGON Z (((0 0 1, 1 0 1, 1 1 1, 0 0 1)), ((2 0 1, 3 0 1, 3 1 1, 2 0 1)))")
+       | st.text(max_size=30).map("POLYGON {}".format))
+def test_any_wkt(text):
+    parse_or_refuse(parse_wkt, text)
