@@ -9,15 +9,14 @@ from .planning import MapError
 PACKAGE = "dubins_rrt_ros"
 
 
-def _prefixes() -> list[Path]:
-    """Where the package may be installed: the ament index' prefixes (colcon, apt), then the interpreter's own (pip)."""
-    ament = [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
-    return [*ament, Path(sys.prefix)]
+def _ament_prefixes() -> list[Path]:
+    """Where colcon and apt may have installed the package."""
+    return [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
 
 
 def maps_directory() -> Path:
-    """The folder of the package's own maps: in the share folder, or in the source tree."""
-    folders = [prefix / "share" / PACKAGE / "maps" for prefix in _prefixes()]
+    """The folder of the package's own maps: in the share folder (of colcon or apt, then of pip), or in the source tree."""
+    folders = [prefix / "share" / PACKAGE / "maps" for prefix in (*_ament_prefixes(), Path(sys.prefix))]
     return next((folder for folder in folders if folder.is_dir()), Path(__file__).resolve().parent.parent / "maps")
 
 
@@ -36,7 +35,10 @@ def find_map(name: str) -> Path:
 
 
 def planner_command() -> list[str]:
-    """The command that starts the node: the installed executable, or the source tree's."""
-    executables = [prefix / folder / "planner" for prefix in _prefixes() for folder in (f"lib/{PACKAGE}", "bin")]
+    """The command that starts the node: the executable of colcon or apt, that of pip, or the source tree's module."""
+    executables = [prefix / "lib" / PACKAGE / "planner" for prefix in _ament_prefixes()]
+    if (Path(sys.prefix) / "lib" / PACKAGE).is_dir():
+        # Not the one in lib, which leaves it to the environment which interpreter it is run by.
+        executables.append(Path(sys.executable).parent / "planner")
     executable = next((file for file in executables if os.access(file, os.X_OK)), None)
     return [str(executable)] if executable else [sys.executable, "-m", f"{PACKAGE}.node"]

@@ -67,5 +67,5 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
     except (TypeError, ValueError):
         numbers = ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise InvalidPose(f"The {name} pose is {tuple(pose) if numbers else pose!r}; give three finite numbers: x [m], y [m], yaw [rad].")
+        raise InvalidPose(f"The {name} pose is {pose}; give three finite numbers: x [m], y [m], yaw [rad].")
     return numbers

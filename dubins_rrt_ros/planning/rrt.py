@@ -27,7 +27,7 @@ from .tree import Tree
 
 NEAR_FACTOR = math.e * (1 + 1 / 3)
 MOST_NEAR = 512
-#: Samples are drawn in blocks of this size, however many of them a batch then takes: the draws never depend on the time.
+#: Samples are drawn in blocks of this size, however many are used: the draws depend neither on the time nor on the budget.
 BLOCK = 256
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
@@ -45,7 +45,7 @@ class Search:
         corners = problem.map.corners()
         lowest, extent = corners.min(axis=0), corners.max(axis=0) - corners.min(axis=0)
         vehicle = problem.vehicle
-        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent, settings.samples)
+        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
         self._grower = Grower(self._tree, field.kernel, vehicle.robot_radius, settings.step_size, NEAR_FACTOR, MOST_NEAR,
                               problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
@@ -80,9 +80,10 @@ class Search:
     def grow(self) -> None:
         """Grow by a batch of samples, which ends early with the first path."""
         if self._used == len(self._block):
-            self._block = self._sampler.draw(min(BLOCK, self._settings.samples - self.samples))
+            self._block = self._sampler.draw(BLOCK)
             self._used = 0
-        begin, end = self._used, min(self._used + self._batch, len(self._block))
+        left = self._settings.samples - self.samples
+        begin, end = self._used, min(self._used + min(self._batch, left), len(self._block))
         self._grower.reserve(end - begin)
         started = time.perf_counter()
         self._used = self._grow(self._block, begin, end)

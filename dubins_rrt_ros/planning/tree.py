@@ -74,7 +74,8 @@ class Tree:
         out = np.empty((len(edge), 2, 2))
         share = total[edge - 1] / steps[edge - 1]
         for end in (0, 1):
-            _dubins.edge_points(self.poses, self.parents, self.words, self.lengths, self.radius, edge, (nth + end) * share, out[:, end])
+            _dubins.edge_points(self.poses, self.parents, self.words, self.lengths, self.radius, edge, (nth + end) * share,
+                                out[:, end])
         return out
 
     def check(self, field: ClearanceField | None = None, need: float = 0.0) -> None:

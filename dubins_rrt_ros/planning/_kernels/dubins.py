@@ -45,12 +45,11 @@ NO_CURVE = cython.declare(cython.double, 1e300)
 @cython.exceptval(check=False)
 def mod_two_pi(angle: cython.double) -> cython.double:
     """`angle` in [0, 2 pi)."""
-    if 0 <= angle < TWO_PI:
-        return angle + 0.0  # no -0.0
-    if -TWO_PI <= angle < 0:
+    if not -TWO_PI <= angle < 2 * TWO_PI:
+        angle = fmod(angle, TWO_PI)
+    if angle < 0:
         return angle + TWO_PI
-    angle = fmod(angle, TWO_PI)
-    return angle + TWO_PI if angle < 0 else angle
+    return angle - TWO_PI if angle >= TWO_PI else angle + 0.0  # no -0.0
 
 
 @cython.cfunc

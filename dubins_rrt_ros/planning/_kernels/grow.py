@@ -50,7 +50,8 @@ class Grower:
     goal_nodes: cython.int[::1]
     goal_count = cython.declare(cython.int, visibility="readonly")
 
-    def __init__(self, tree: SearchTree, clearance: Clearance, need, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
+    def __init__(self, tree: SearchTree, clearance: Clearance, need, step, near_factor, most_near, goal,
+                 tolerance_xy, tolerance_yaw):
         """
         Args:
             need: the clearance that every edge keeps [m].

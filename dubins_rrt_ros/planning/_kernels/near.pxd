@@ -5,6 +5,7 @@ cdef class NearSet:
     cdef int count
     cdef int wanted
     cdef double reach
+    cdef double guess
     cdef double x
     cdef double y
     cdef double theta

@@ -20,6 +20,10 @@ else:
     from .tree import SearchTree
 
 
+#: The next near set is guessed to reach this much farther than the last.
+GUESS = cython.declare(cython.double, 1.25)
+
+
 @cython.cclass
 class NearSet:
     """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
@@ -31,6 +35,7 @@ class NearSet:
     def __init__(self, tree: SearchTree, capacity: cython.int):
         self.tree = tree
         self.count = 0
+        self.guess = tree.radius
         self.keys = np.empty(capacity)
         self.nodes = np.empty(capacity, np.int32)
         self.words = np.empty(capacity, np.int8)
@@ -40,10 +45,18 @@ class NearSet:
     @cython.nogil
     @cython.exceptval(check=False)
     def collect_nearest(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int) -> cython.void:
-        """Find the `wanted` nodes with the shortest curves to a pose, at most as many as there is room for."""
-        self.begin(x, y, theta, NO_CURVE)
-        self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
+        """Find the `wanted` nodes with the shortest curves to a pose, at most as many as there is room for.
+
+        A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
+        """
+        self.wanted = min(min(wanted, self.tree.size), cython.cast(cython.int, self.keys.shape[0]))
+        self.begin(x, y, theta, self.guess)
         self.consider_all()
+        while self.count < self.wanted:
+            self.guess *= 2
+            self.begin(x, y, theta, self.guess)
+            self.consider_all()
+        self.guess = GUESS * self.reach
 
     @cython.cfunc
     @cython.nogil

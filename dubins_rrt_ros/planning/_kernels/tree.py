@@ -10,6 +10,10 @@ else:
     from math import cos, sin, sqrt
 
 
+#: About how many buckets there are. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
+BUCKETS = 1024
+
+
 @cython.cclass
 class SearchTree:
     """A tree of poses, hashed by position.
@@ -24,18 +28,17 @@ class SearchTree:
         words, lengths: (n,) and (n, 3): the edges from the parents; lengths in metres.
     """
 
-    def __init__(self, root, radius: cython.double, corner, extent, expected: cython.int):
+    def __init__(self, root, radius: cython.double, corner, extent):
         """A tree of its root alone.
 
         Args:
             root: (x, y, theta).
             corner, extent: lowest (x, y) of the map, and its size [m].
-            expected: how many nodes there will be, which sets the size of the buckets.
         """
         self.radius = radius
         self.x0, self.y0 = corner
         width, height = extent
-        self.bucket_size = sqrt(width * height / min(max(expected / 2, 64), 65536))
+        self.bucket_size = sqrt(width * height / BUCKETS)
         shape = (int(height / self.bucket_size) + 1, int(width / self.bucket_size) + 1)
         self.buckets = np.full(shape, -1, dtype=np.int32)
         self.size = 0
