@@ -1,0 +1,135 @@
+"""`dubins_rrt demo`: start the node, send it a start and a goal over real topics, receive the path and draw it."""
+
+import argparse
+import contextlib
+import importlib.util
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from typing import IO, TYPE_CHECKING
+
+from dubins_rrt_ros.share import maps_directory, planner_command
+
+from .output import check_drawing, check_folder
+
+if TYPE_CHECKING:
+    from .demo_client import Answer
+
+START, GOAL = (1.5, 2.0, math.pi / 2), (13.5, 10.5, math.pi / 2)
+PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000,
+              "planning_time": 2.0, "seed": 1}
+#: How long the node may take to stop [s].
+STOP_TIME = 10.0
+
+
+class DemoError(Exception):
+    """The demonstration failed; the message says where and what to do."""
+
+
+class PlannerProcess:
+    """The installed node in a process group of its own; what it logs is kept for the message of a failure."""
+
+    def __init__(self, log: IO[str]):
+        parameters = PARAMETERS | {"map_file": maps_directory() / "maze.yaml"}
+        assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        self._log = log
+        self._process = subprocess.Popen([*planner_command(), "--ros-args", *assignments], stdin=subprocess.DEVNULL,
+                                         stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+
+    def check(self) -> None:
+        """Raise DemoError where the node has ended."""
+        status = self._process.poll()
+        if status is not None:
+            raise DemoError(f"the node ended with exit status {status}: {self._last_line()}")
+
+    def stop(self) -> int:
+        """End the node as Ctrl-C does, and return its exit status."""
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGINT)
+            try:
+                self._process.wait(STOP_TIME)
+            except subprocess.TimeoutExpired:
+                os.killpg(self._process.pid, signal.SIGKILL)
+        return self._process.wait()
+
+    def _last_line(self) -> str:
+        self._log.seek(0)
+        lines = [line for line in self._log.read().splitlines() if line.strip()]
+        return lines[-1] if lines else "it said nothing"
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("demo", help="see the ROS node plan in the maze",
+                                   description="Starts the node on the installed maze, sends it a start and a goal "
+                                               "over real topics, receives the path, draws it and stops the node.")
+    parser.add_argument("--plot", metavar="FILE", default="demo.png",
+                        help="the picture (.png, .svg, .pdf); default demo.png")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Demonstrate, and return the exit status: 0 with a path."""
+    check_folder(arguments.plot)
+    check_drawing(arguments.plot)
+    try:
+        answer, exit_status = _demonstrate()
+    except DemoError as error:
+        print(f"dubins_rrt demo: error: {error}", file=sys.stderr)
+        return 1
+    _report(answer)
+    _draw(arguments.plot, answer)
+    print(f"  picture        {arguments.plot}\n  node stopped   exit status {exit_status}")
+    return 0
+
+
+def _demonstrate() -> tuple["Answer", int]:
+    """The node's answer and its exit status.
+
+    Raises:
+        DemoError: there is none.
+    """
+    if importlib.util.find_spec("rclpy") is None:
+        raise DemoError("ROS 2 is not here (no module rclpy); run: pip install '.[ros]'")
+    # A domain of its own and this machine alone: no robot nearby shall hear of it.
+    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    from .demo_client import DemoClient
+    with _planner() as planner:
+        with DemoClient(planner.check) as client:
+            answer = client.ask(START, GOAL, PARAMETERS)
+        return answer, planner.stop()
+
+
+@contextlib.contextmanager
+def _planner() -> Iterator[PlannerProcess]:
+    # SIGTERM ends this process as Ctrl-C does, so that it leaves no node behind.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+        planner = PlannerProcess(log)
+        try:
+            yield planner
+        finally:
+            planner.stop()
+            signal.signal(signal.SIGTERM, before)
+
+
+def _report(answer: "Answer") -> None:
+    figures = answer.figures
+    gap = 100 * figures["gap"]
+    print(f"  path           {figures['path_length']:.2f} m, {len(answer.path)} poses on the topic plan\n"
+          f"  lower bound    {figures['lower_bound']:.2f} m, so at most {gap:.1f} % above the shortest\n"
+          f"  first path     after {1000 * figures['time_to_first']:.1f} ms\n"
+          f"  planning time  {1000 * figures['planning_time']:.1f} ms for {figures['samples']:.0f} samples, "
+          f"{figures['tree_nodes']:.0f} tree nodes")
+
+
+def _draw(file: str, answer: "Answer") -> None:
+    from .plots import Drawing, draw, figures_title, path_title  # here, for matplotlib is slow to import
+    figures = answer.figures
+    draw(file, Drawing(answer.map, START, GOAL, PARAMETERS["robot_radius"], answer.tree, answer.path,
+                       path_title(PARAMETERS["planner"], figures["path_length"], figures["gap"]),
+                       figures_title(int(figures["samples"]), figures["time_to_first"], figures["planning_time"])))

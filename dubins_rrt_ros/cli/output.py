@@ -1,0 +1,50 @@
+"""The files that the command line writes: JSON and CSV here, pictures in plots.py."""
+
+import csv
+import json
+from pathlib import Path
+
+from dubins_rrt_ros.planning import Plan
+from dubins_rrt_ros.planning.plan_file import to_document
+
+from .flags import UsageError
+
+STDOUT = "-"
+DRAWINGS = (".png", ".svg", ".pdf")
+
+
+def check_folder(*files: str | None) -> None:
+    """Refuse a file in a folder that does not exist; to be called before planning, so that no plan is lost for it.
+
+    Raises:
+        UsageError: one of the files has no folder.
+    """
+    for file in files:
+        if file and file != STDOUT and not Path(file).parent.is_dir():
+            raise UsageError(f"there is no folder {Path(file).parent} to write {Path(file).name} to; make it first")
+
+
+def check_drawing(file: str | None) -> None:
+    """Refuse a picture in a format that is not drawn.
+
+    Raises:
+        UsageError: the name ends otherwise.
+    """
+    if file and Path(file).suffix.lower() not in DRAWINGS:
+        raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(DRAWINGS)}")
+
+
+def write_json(file: str, plan: Plan, map_name: str) -> None:
+    """Write the plan; `file` may be - for standard output."""
+    text = json.dumps(to_document(plan, map_name), allow_nan=False)
+    if file == STDOUT:
+        print(text)
+    else:
+        Path(file).write_text(text + "\n", encoding="utf-8")
+
+
+def write_csv(file: str, plan: Plan) -> None:
+    """Write the poses of the path at the spacing of the settings: a header x,y,theta and a row each."""
+    poses = plan.path.poses(plan.settings.path_spacing).tolist() if plan.path else []
+    with Path(file).open("w", newline="", encoding="utf-8") as out:
+        csv.writer(out, lineterminator="\n").writerows([["x", "y", "theta"], *poses])

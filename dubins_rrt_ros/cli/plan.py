@@ -1,0 +1,138 @@
+"""`dubins_rrt plan`: plan one path, and report it, write it, draw it."""
+
+import argparse
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+from tqdm import tqdm
+
+from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
+
+from .flags import UsageError, add_option_flags, given_options
+from .output import STDOUT, check_drawing, check_folder, write_csv, write_json
+from .request import MAX_MAP_CELLS, Request, read_map, read_replay
+
+
+class _Replay(argparse.Action):
+    """Takes the file, and asks no more for what is in it."""
+
+    def __init__(self, *, holds: tuple[argparse.Action, ...], **keywords: Any):
+        super().__init__(**keywords)
+        self.holds = holds
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        namespace.replay = values
+        for action in self.holds:
+            action.required = False
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("plan", help="plan a path on a map",
+                                   description="Plans a path on a map, prints its figures and writes it to files.")
+    pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW"), "required": True, "default": argparse.SUPPRESS}
+    request = (parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
+                                   help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze"),
+               parser.add_argument("--start", **pose, help="where the vehicle is [m, m, rad]"),
+               parser.add_argument("--goal", **pose, help="where it shall be [m, m, rad]"))
+    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
+                        help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
+    parser.add_argument("--json", metavar="FILE", help="write the plan, also without a path; - is standard output")
+    parser.add_argument("--csv", metavar="FILE", help="write the path's poses as x,y,theta")
+    parser.add_argument("--plot", metavar="FILE", help="draw map, tree and path; .png, .svg or .pdf")
+    parser.add_argument("--replay", metavar="FILE", action=_Replay, holds=request,
+                        help="plan the request of a file that --json wrote again, in place of all other options: with "
+                             "its seed and as many samples as it drew, and no time limit, so that the path is the same")
+    for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
+        add_option_flags(parser, title, cls)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan, write the files, and return the exit status."""
+    check_folder(arguments.json, arguments.csv, arguments.plot)
+    check_drawing(arguments.plot)
+    request = _request(arguments)
+    with _interrupt() as cancel, _progress_bar(request.settings.samples) as on_progress:
+        answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
+    answer = replace(answer, map_time=answer.map_time + request.load_time)
+    _write(answer, request.map_name, arguments)
+    _report(answer, request, sys.stderr if arguments.json == STDOUT else sys.stdout)
+    return 0 if answer.path else 1
+
+
+def _request(arguments: argparse.Namespace) -> Request:
+    if arguments.replay is None:
+        return _new_request(arguments)
+    besides = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", "max_map_cells"}
+    if besides:
+        raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(besides))}")
+    return read_replay(arguments.replay, arguments.max_map_cells)
+
+
+def _new_request(arguments: argparse.Namespace) -> Request:
+    vehicle = Vehicle(**given_options(arguments, Vehicle))
+    settings = Settings(**given_options(arguments, Settings))
+    map, load_time = read_map(arguments.map, arguments.max_map_cells)
+    problem = Problem(map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
+    return Request(arguments.map, problem, settings, load_time)
+
+
+@contextlib.contextmanager
+def _interrupt() -> Iterator[Callable[[], bool]]:
+    """Let the first Ctrl-C ask the planner for the best path so far; the second interrupts as ever."""
+    asked = threading.Event()
+
+    def ask(signum, frame):
+        signal.signal(signal.SIGINT, before)
+        asked.set()
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def _progress_bar(samples: int) -> Iterator[Callable[[Progress], None]]:
+    """A bar on a terminal; nothing elsewhere."""
+    with tqdm(total=samples, unit=" samples", file=sys.stderr, disable=None, leave=False) as bar:
+        def show(progress: Progress) -> None:
+            if progress.length is not None:
+                bar.set_postfix_str(f"path {progress.length:.2f} m", refresh=False)
+            bar.update(progress.samples - bar.n)
+
+        yield show
+
+
+def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:
+    if arguments.json:
+        write_json(arguments.json, answer, map_name)
+    if arguments.csv:
+        write_csv(arguments.csv, answer)
+    if arguments.plot:
+        from .plots import draw_plan  # here, for matplotlib takes longer to import than most plans to make
+        draw_plan(arguments.plot, answer)
+
+
+def _report(answer: Plan, request: Request, out: Any) -> None:
+    if answer.path is None:
+        print(f"{int(answer.status)} {answer.status.name}: {answer.message}", file=sys.stderr)
+        return
+    print(answer.message, _more_figures(answer), file=out)
+    if request.path is not None and request.path != answer.path:
+        print(f"dubins_rrt plan: the path is not the one of {request.source}, which another version may have planned",
+              file=sys.stderr)
+
+
+def _more_figures(answer: Plan) -> str:
+    """What a message of success leaves out: it has length, gap, samples and planning time."""
+    return (f"Lower bound {answer.lower_bound:.2f} m, first path after {answer.time_to_first:.3g} s, "
+            f"{len(answer.tree)} tree nodes, least clearance {answer.min_clearance:.3g} m, "
+            f"seed {answer.settings.seed}.")

@@ -1,0 +1,54 @@
+"""`dubins_rrt render`: the grid of a polygon map, as files that map_server reads."""
+
+import argparse
+import math
+from pathlib import Path
+
+from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
+
+from .flags import UsageError
+
+#: Each cell is a polygon while it is judged, a few hundred bytes.
+MAX_CELLS = 4_000_000
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "render", help="make a map_server pair of a polygon map",
+        description="Makes the grid of a polygon map and writes it as map_server's YAML and image. A cell is occupied "
+                    "where it meets an obstacle, be it with a corner.")
+    parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt)")
+    parser.add_argument("--resolution", metavar="m", type=float, default=0.05,
+                        help="the side of a cell [m]; default 0.05")
+    parser.add_argument("--out", metavar="DIR", help="where to write; by default beside the polygon map")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the pair and say so."""
+    source = Path(arguments.map)
+    folder = Path(arguments.out) if arguments.out else source.parent
+    grid = rasterise(_polygons(source, arguments.resolution), arguments.resolution)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = folder / f"{source.stem}.yaml"
+    save_map(grid, written)
+    rows, columns = grid.data.shape
+    print(f"{written} and its image: {columns} x {rows} cells of {grid.resolution:g} m, "
+          f"{(grid.data > 0).mean():.0%} of them occupied")
+    return 0
+
+
+def _polygons(source: Path, resolution: float) -> PolygonMap:
+    """The polygon map, where a grid of it has a sensible size."""
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise UsageError(f"--resolution is {resolution:g}; it must be a positive number of metres")
+    map = load_map(source)
+    if not isinstance(map, PolygonMap):
+        raise UsageError(f"{source} is a grid already; give a polygon map (.geojson or .wkt)")
+    low, high = map.corners()[[0, 2]]
+    cells = math.prod(float(side) / resolution + 2 for side in high - low)
+    if cells > MAX_CELLS:
+        raise UsageError(f"--resolution {resolution:g} makes a grid of {cells:.2g} cells from {source}; at most "
+                         f"{MAX_CELLS:g} are made, so give a coarser one")
+    return map

@@ -1,0 +1,211 @@
+"""`dubins_rrt plan`, by what it prints, writes and returns."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.planning import PolygonMap, rasterise, save_map
+
+HALL = shapely.box(-6, -5, 6, 5).difference(shapely.box(-1, -5, 0, 1))
+REQUEST = ["--start", "-4", "-3", "1.5707963267948966", "--goal", "3.5", "-3", "-1.5707963267948966"]
+BUDGET = ["--samples", "150", "--planning-time", "60", "--seed", "4"]
+
+
+@pytest.fixture
+def hall(tmp_path, monkeypatch):
+    """A map file in the current folder, which is empty otherwise."""
+    monkeypatch.chdir(tmp_path)
+    Path("hall.wkt").write_text(HALL.wkt)
+    return "hall.wkt"
+
+
+def run(*argv, capsys):
+    status = main(["plan", *argv])
+    return status, *capsys.readouterr()
+
+
+def refusal(*argv, capsys):
+    """The one line on standard error of a command that is used wrongly."""
+    try:
+        status = main(["plan", *argv])
+    except SystemExit as end:
+        status = end.code
+    out, error = capsys.readouterr()
+    assert status == 2 and out == "" and error.count("\n") == 1 and "Traceback" not in error
+    return error
+
+
+def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
+    status, out, error = run(hall, *REQUEST, *BUDGET, capsys=capsys)
+    assert status == 0 and error == "" and out.count("\n") == 1
+    for figure in (" m, ", "%", "150 samples", "Lower bound ", "first path after ", "tree nodes", "seed 4"):
+        assert figure in out
+
+
+def test_json_on_standard_output_stands_alone(hall, capsys):
+    status, out, error = run(hall, *REQUEST, *BUDGET, "--json", "-", capsys=capsys)
+    document = json.loads(out)
+    assert status == 0 and document["error_code"] == 0 and document["map"] == hall
+    assert document["start"] == [-4.0, -3.0, 1.5707963267948966] and document["settings"]["samples"] == 150
+    assert "150 samples" in error
+
+
+def test_csv_and_json_hold_the_same_poses_from_start_to_goal(hall, capsys):
+    files = ["--json", "p.json", "--csv", "p.csv", "--path-spacing", "0.2"]
+    assert run(hall, *REQUEST, *BUDGET, *files, capsys=capsys)[0] == 0
+    header, *rows = Path("p.csv").read_text().splitlines()
+    poses = np.array([list(map(float, row.split(","))) for row in rows])
+    assert header == "x,y,theta"
+    assert poses.tolist() == json.loads(Path("p.json").read_text())["poses"]
+    assert poses[[0, -1]].tolist() == [[-4.0, -3.0, 1.5707963267948966], [3.5, -3.0, -1.5707963267948966]]
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.2
+    assert shapely.covers(HALL, shapely.points(poses[:, :2])).all()
+
+
+def test_the_plot_shows_the_planned_path(hall, capsys):
+    from matplotlib.image import imread
+    assert run(hall, *REQUEST, *BUDGET, "--plot", "p.png", capsys=capsys)[0] == 0
+    pixels = np.round(imread("p.png")[..., :3] * 255)
+    assert (np.abs(pixels - [0xd5, 0x5e, 0x00]) < 3).all(axis=2).sum() > 2000
+
+
+def test_no_path_gives_the_reason_in_one_line_and_the_files(hall, capsys):
+    files = ["--json", "p.json", "--csv", "p.csv", "--plot", "p.svg"]
+    status, out, error = run(hall, "--start", "-0.5", "-2", "0", *REQUEST[4:], *files, capsys=capsys)
+    assert status == 1 and out == "" and error.startswith("205 START_OCCUPIED: ") and error.count("\n") == 1
+    assert json.loads(Path("p.json").read_text())["error_name"] == "START_OCCUPIED"
+    assert Path("p.csv").read_text() == "x,y,theta\n" and "START_OCCUPIED" in Path("p.svg").read_text()
+
+
+@pytest.mark.parametrize("number", ["-1e-3", "-.5", "-4"])
+def test_negative_numbers_are_values(hall, number, capsys):
+    _, out, _ = run(hall, "--start", number, number, number, *REQUEST[4:], *BUDGET, "--json", "-", capsys=capsys)
+    assert json.loads(out)["start"] == [float(number)] * 3
+
+
+def test_every_option_is_a_flag(hall, capsys):
+    flags = ["--turning-radius", "0.5", "--robot-radius", "0.1", "--planner", "rrt", "--goal-bias", "0.5",
+             "--step-size", "2", "--heading-sampling", "goal", "--path-spacing", "0.5", "--goal-tolerance-xy", "0.25",
+             "--goal-tolerance-yaw", "0.5", "--any-goal-heading", "--no-allow-unknown"]
+    document = json.loads(run(hall, *REQUEST, *BUDGET, *flags, "--json", "-", capsys=capsys)[1])
+    assert document["vehicle"]["turning_radius"] == 0.5 and document["vehicle"]["robot_radius"] == 0.1
+    told = {"planner": "rrt", "goal_bias": 0.5, "step_size": 2.0, "heading_sampling": "goal", "path_spacing": 0.5,
+            "goal_tolerance_xy": 0.25, "goal_tolerance_yaw": 0.5, "any_goal_heading": True, "allow_unknown": False}
+    assert document["settings"].items() >= told.items()
+
+
+@pytest.mark.parametrize(("flags", "names"), [
+    (["--turning-radius", "-1"], "turning_radius is -1"), (["--turning-radius", "wide"], "--turning-radius"),
+    (["--samples", "0"], "samples is 0"), (["--planner", "a_star"], "--planner"),
+    (["--wheelbase", "1"], "max_steering_angle"), (["--start", "1", "2"], "--start"),
+    (["--start", "1", "2", "nan"], "INVALID_POSE"), (["--start", "-inf", "2", "0"], "-inf"),
+    (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.gif"], "p.gif"), (["--sampels", "3"], "--sampels")])
+def test_wrong_usage_takes_one_line(hall, flags, names, capsys):
+    assert names in refusal(hall, *REQUEST, *flags, capsys=capsys)
+
+
+def test_a_missing_or_broken_map_takes_one_line(hall, capsys):
+    assert "nowhere.yaml" in refusal("nowhere.yaml", *REQUEST, capsys=capsys)
+    Path("broken.yaml").write_text("image: nothing.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
+    assert "broken.yaml" in refusal("broken.yaml", *REQUEST, capsys=capsys)
+    assert "MAP" in refusal(*REQUEST, capsys=capsys)
+
+
+def test_a_grid_above_max_map_cells_is_refused(hall, capsys):
+    save_map(rasterise(PolygonMap(HALL), 0.5), "hall.yaml")
+    assert "max_map_cells" in refusal("hall.yaml", *REQUEST, "--max-map-cells", "100", capsys=capsys)
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+def test_replay_plans_the_same_path_from_another_folder(hall, planner, tmp_path, monkeypatch, capsys):
+    budget = ["--planner", planner, "--samples", "300", "--planning-time", "60"]
+    first = json.loads(run(hall, *REQUEST, *budget, "--json", "-", capsys=capsys)[1])
+    assert first["settings"]["seed"] == first["seed"] >= 0
+    Path("p.json").write_text(json.dumps(first))
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    status, out, error = run("--replay", "../p.json", "--json", "-", capsys=capsys)
+    second = json.loads(out)
+    assert status == 0 and "is not the one" not in error
+    for name in ("curves", "poses", "length", "seed", "samples", "tree_nodes", "start", "goal", "vehicle", "map_id"):
+        assert second[name] == first[name], name
+
+
+def test_replay_tells_of_a_path_that_is_not_the_one(hall, capsys):
+    document = json.loads(run(hall, *REQUEST, *BUDGET, "--json", "-", capsys=capsys)[1])
+    document["curves"][0]["lengths"][0] += 1e-9
+    Path("p.json").write_text(json.dumps(document))
+    status, _, error = run("--replay", "p.json", capsys=capsys)
+    assert status == 0 and "is not the one of p.json" in error
+
+
+def test_replay_refuses_another_map_and_other_options(hall, capsys):
+    assert run(hall, *REQUEST, *BUDGET, "--json", "p.json", capsys=capsys)[0] == 0
+    assert "samples" in refusal("--replay", "p.json", "--samples", "7", capsys=capsys)
+    Path("hall.wkt").write_text(HALL.difference(shapely.box(4, 4, 5, 5)).wkt)
+    assert "map_id" in refusal("--replay", "p.json", capsys=capsys)
+    Path("hall.wkt").unlink()
+    assert "no such map" in refusal("--replay", "p.json", capsys=capsys)
+    assert "p.csv" in refusal("--replay", "p.csv", capsys=capsys)
+
+
+def command(*words):
+    return [sys.executable, "-m", "dubins_rrt_ros", "plan", *words]
+
+
+def on_a_terminal(words, *, interrupt_at=None):
+    """Run the command with a terminal as its standard error; exit status, standard output, what the terminal showed."""
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (24, 100))
+    with subprocess.Popen(command(*words), stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+        os.close(theirs)
+        shown = _read(ours, process if interrupt_at else None, interrupt_at)
+        out = process.stdout.read()
+    os.close(ours)
+    return process.returncode, out, shown
+
+
+def _read(terminal, process, interrupt_at):
+    shown = b""
+    while True:
+        try:
+            shown += os.read(terminal, 4096)
+        except OSError:  # the other end is closed
+            return shown.decode()
+        if process and interrupt_at in shown:
+            process.send_signal(signal.SIGINT)
+            process = None
+
+
+def test_a_terminal_sees_a_bar(hall):
+    status, out, shown = on_a_terminal([hall, *REQUEST, *BUDGET])
+    assert status == 0 and "150 samples" in out
+    assert "/150" in shown and "%" in shown
+
+
+def test_ctrl_c_gives_the_best_path_so_far(hall):
+    budget = ["--samples", "10000000", "--planning-time", "3600", "--seed", "4"]
+    status, out, shown = on_a_terminal([hall, *REQUEST, *budget, "--json", "p.json"], interrupt_at=b"path ")
+    document = json.loads(Path("p.json").read_text())
+    assert status == 0 and document["error_code"] == 0 and document["samples"] < 10_000_000
+    assert "Traceback" not in shown and "tree nodes" in out
+
+
+def test_ctrl_c_before_a_path_is_cancelled(hall):
+    """The goal lies behind a gap that the vehicle fits through only by a hair."""
+    Path("gap.wkt").write_text(shapely.box(-6, -5, 6, 5).difference(
+        shapely.union_all([shapely.box(-1, -5, 1, -0.2001), shapely.box(-1, 0.2001, 1, 5)])).wkt)
+    budget = ["--samples", "10000000", "--planning-time", "3600", "--goal-bias", "0", "--seed", "4"]
+    status, out, shown = on_a_terminal(["gap.wkt", "--start", "-4", "-3", "2", "--goal", "3.5", "3", "2", *budget],
+                                       interrupt_at=b"samples/s")
+    assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown

@@ -1,0 +1,116 @@
+"""Plans as JSON documents: every number comes back as it was, and the request can be planned again."""
+
+import dataclasses
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
+from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
+
+FIGURES = ("time_to_first", "planning_time", "map_time", "length", "lower_bound", "gap", "min_clearance",
+           "max_curvature")
+FIELDS = {"error_code", "error_name", "message", "planner", "seed", "samples", "tree_nodes", *FIGURES, "audit",
+          "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}
+
+
+@pytest.fixture(scope="module")
+def hall():
+    return PolygonMap(shapely.box(0, 0, 12, 10).difference(shapely.box(5, 0, 6, 6)))
+
+
+@pytest.fixture(scope="module")
+def answer(hall):
+    vehicle = Vehicle(robot_radius=0.3, wheelbase=0.7, max_steering_angle=0.6)
+    problem = Problem(hall, vehicle, (2.0, 2.0, math.pi / 2), (9.0, 2.0, -math.pi / 2))
+    answer = plan(problem, Settings(samples=150, planning_time=60.0, path_spacing=0.3, seed=4))
+    assert answer.path is not None, answer.message
+    return answer
+
+
+def through_json(answer):
+    return json.loads(json.dumps(to_document(answer, "hall.wkt"), allow_nan=False))
+
+
+def test_the_document_has_the_promised_fields(answer):
+    document = through_json(answer)
+    assert set(document) == FIELDS
+    assert document["error_code"] == 0 and document["error_name"] == "NONE" and document["audit"] == "ok"
+    assert document["map"] == "hall.wkt" and document["map_id"] == answer.problem.map.id
+    assert document["settings"] == values(answer.problem) | values(answer.settings)
+    assert document["tree_nodes"] > 1 and document["samples"] == answer.samples and document["seed"] == 4
+
+
+def test_the_figures_read_back_bit_for_bit(answer):
+    document = through_json(answer)
+    for name in FIGURES:
+        assert document[name] == getattr(answer, name), name
+    assert tuple(document["start"]) == answer.problem.start and tuple(document["goal"]) == answer.problem.goal
+    assert document["vehicle"] == values(answer.problem.vehicle)
+
+
+def test_the_path_reads_back_bit_for_bit(answer):
+    document = through_json(answer)
+    path = read_path(document)
+    assert path == answer.path
+    assert np.array(document["poses"]).tobytes() == answer.path.poses(0.3).tobytes()
+    assert path.poses(0.01).tobytes() == answer.path.poses(0.01).tobytes()
+
+
+def test_the_request_reads_back_and_gives_the_same_path(answer, hall):
+    problem, settings = read_request(through_json(answer), hall)
+    assert problem.vehicle == answer.problem.vehicle and problem.start == answer.problem.start
+    assert settings == dataclasses.replace(answer.settings, planning_time=3600.0)
+    assert plan(problem, settings).path == answer.path
+
+
+def test_a_search_that_was_cut_short_is_cut_at_the_same_sample(answer, hall):
+    asked = itertools.count()
+    cut = plan(answer.problem, answer.settings, cancel=lambda: next(asked) == 3)
+    assert 0 < cut.samples < answer.settings.samples
+    problem, settings = read_request(through_json(cut), hall)
+    again = plan(problem, settings)
+    assert again.samples == cut.samples
+    assert again.tree.poses.tobytes() == cut.tree.poses.tobytes() and again.path == cut.path
+
+
+def test_without_a_path_the_document_says_so(hall):
+    answer = plan(Problem(hall, Vehicle(), (5.5, 3.0, 0.0), (9.0, 2.0, 0.0)), Settings(samples=10, seed=1))
+    document = through_json(answer)
+    assert document["error_code"] == 205 and document["error_name"] == "START_OCCUPIED" and document["message"]
+    assert document["curves"] == document["poses"] == []
+    assert all(document[name] is None for name in ("length", "gap", "time_to_first", "min_clearance", "max_curvature"))
+    assert read_path(document) is None
+    assert read_request(document, hall)[1].samples == 10
+
+
+def changed(answer, **fields):
+    return through_json(answer) | fields
+
+
+@pytest.mark.parametrize(("field", "value", "names"), [
+    ("settings", None, "settings"), ("vehicle", [], "vehicle"), ("start", [1.0, 2.0], "start"),
+    ("samples", "many", "samples"), ("vehicle", {"turning_radius": 1.0}, "wheelbase"),
+    ("settings", {"flux": 1}, "flux")])
+def test_a_document_with_a_wrong_request_names_the_field(answer, hall, field, value, names):
+    with pytest.raises(ValueError, match=names):
+        read_request(changed(answer, **{field: value}), hall)
+
+
+def test_a_setting_out_of_range_is_refused(answer, hall):
+    document = through_json(answer)
+    document["settings"]["goal_bias"] = 7.0
+    with pytest.raises(OptionError, match="goal_bias"):
+        read_request(document, hall)
+
+
+@pytest.mark.parametrize(("curve", "names"), [
+    (7, "curves"), ({}, "word"), ({"word": "LLL"}, "LLL"), ({"word": "LSL", "start": [0.0, 0.0]}, "start"),
+    ({"word": "LSL", "start": [0.0, 0.0, 0.0], "radius": "1"}, "radius")])
+def test_a_document_with_a_wrong_curve_names_the_field(answer, curve, names):
+    with pytest.raises(PlanFileError, match=names):
+        read_path(changed(answer, curves=[curve]))
