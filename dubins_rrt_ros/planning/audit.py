@@ -49,6 +49,8 @@ class Audit:
 
 def audit(path: Path, problem: Problem) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance."""
+    if broken := _broken_curves(path):
+        return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = _drive(path)
     findings = [*_end_findings(path, problem), *_joint_findings(path, starts, ends), *_turn_findings(path, problem)]
     obstacles = _obstacles_of(problem)
@@ -76,6 +78,14 @@ class _Arcs:
         chord = s * np.sinc(half / math.pi)
         direction = self.theta[index] + half
         return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
+
+
+def _broken_curves(path: Path) -> tuple[str, ...]:
+    """A sentence for each curve that cannot be driven."""
+    return tuple(f"curve {i} cannot be driven: start {curve.start}, radius {curve.radius}, lengths {curve.lengths}"
+                 for i, curve in enumerate(path.curves)
+                 if not (all(map(math.isfinite, (*curve.start, curve.radius, *curve.lengths)))
+                         and curve.radius > 0 and min(curve.lengths) >= 0))
 
 
 def _turns(curve) -> bool:
@@ -125,10 +135,8 @@ def _turn_findings(path: Path, problem: Problem) -> list[str]:
     least = problem.vehicle.turning_radius
     findings = []
     for i, curve in enumerate(path.curves):
-        if not curve.radius >= least * (1 - TOLERANCE):
+        if curve.radius < least * (1 - TOLERANCE):
             findings.append(f"curve {i} turns with a radius of {curve.radius:g} m, tighter than {least:g} m")
-        if not all(length >= 0 and math.isfinite(length) for length in curve.lengths):
-            findings.append(f"curve {i} has the arc lengths {curve.lengths}")
     return findings
 
 

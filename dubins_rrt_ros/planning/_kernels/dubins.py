@@ -137,12 +137,35 @@ def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q
 @cython.nogil
 @cython.inline
 @cython.exceptval(check=False)
+def turn_at_least(cos_turn: cython.double, sin_turn: cython.double) -> cython.double:
+    """A lower bound of a turn in [0, 2 pi): its chord, which is at most the turn and at least 2 / pi of a turn up to pi."""
+    chord: cython.double = sqrt(max(2 - 2 * cos_turn, 0.0))
+    return chord if sin_turn > -2 * NEARLY_NONE else TWO_PI - PI / 2 * chord
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def straight_turns_at_least(first: cython.int, last: cython.int, cos_straight: cython.double, sin_straight: cython.double,
+                            sin0: cython.double, cos0: cython.double, sin1: cython.double,
+                            cos1: cython.double) -> cython.double:
+    """A lower bound of the two turns into and out of a straight arc of known direction."""
+    return (turn_at_least(cos_straight * cos0 + sin_straight * sin0, first * (sin_straight * cos0 - cos_straight * sin0))
+            + turn_at_least(cos_straight * cos1 + sin_straight * sin1, last * (cos_straight * sin1 - sin_straight * cos1)))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
 def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
          theta1: cython.double, sin1: cython.double, cos1: cython.double, left: cython.double,
          limit: cython.double) -> tuple[cython.double, cython.double, cython.double]:
     """(t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1), or p = NO_CURVE: none, or none shorter than `limit`.
 
-    `left` is theta1 - theta0 in [0, 2 pi). It and (u, v) tell most words to be too long before a root or an arctangent is taken.
+    `left` is theta1 - theta0 in [0, 2 pi). It, (u, v), and the direction of the straight arc tell most words to be too long
+    before an arctangent is taken.
     """
     s: cython.int = turn_of(word, 0)
     last: cython.int = turn_of(word, 2)
@@ -169,6 +192,8 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         if turned >= limit or squared >= (limit - turned) * (limit - turned):
             return 0, NO_CURVE, 0
         p = sqrt(squared)
+        if p > 0 and p + straight_turns_at_least(s, last, u / p, v / p, sin0, cos0, sin1, cos1) >= limit:
+            return 0, NO_CURVE, 0
         t = mod_two_pi(s * (atan2(v, u) - theta0))
         q = mod_two_pi(turned - t)
     else:
@@ -176,6 +201,9 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         if squared < 4 - ROUNDING or least >= limit or squared - 4 >= (limit - least) * (limit - least):
             return 0, NO_CURVE, 0
         p = sqrt(max(squared - 4, 0.0))
+        if p + straight_turns_at_least(s, last, (p * u - 2 * s * v) / squared, (p * v + 2 * s * u) / squared,
+                                       sin0, cos0, sin1, cos1) >= limit:
+            return 0, NO_CURVE, 0
         t = mod_two_pi(s * (atan2(v, u) - theta0) + atan2(2.0, p))
         q = mod_two_pi(t - turned)
     if t > TWO_PI - NEARLY_NONE or q > TWO_PI - NEARLY_NONE:
