@@ -27,7 +27,8 @@ def find_map(name: str) -> Path:
         MapError: there is none.
     """
     path, own = Path(name), maps_directory()
-    for candidate in (path, own / path.name, own / f"{path.name}.yaml"):
+    named = path.parent in (Path("."), Path("maps"))
+    for candidate in (path, *((own / path.name, own / f"{path.name}.yaml") if named else ())):
         if candidate.is_file():
             return candidate
     names = ", ".join(sorted(file.name for file in own.glob("*") if file.suffix in (".yaml", ".geojson", ".wkt")))

@@ -20,9 +20,12 @@ from .problem import Problem
 TOLERANCE = 1e-6
 #: A sample this much too near an obstacle is a finding [m]; what may lie between samples is at most that nearer still.
 CONTACT = 1e-6
+#: A vehicle without extent is judged as a disc of this radius [m]: a point may cross a line that it keeps the distance 0 to.
+POINT = 1e-5
 #: The least clearance is found to within this [m].
 PRECISION = 1e-3
-FIRST_PIECE = 0.1
+#: About how many pieces a path is cut into at first.
+FIRST_PIECES = 64
 
 _judges: WeakKeyDictionary[Map, dict[bool, "_Obstacles"]] = WeakKeyDictionary()
 
@@ -49,13 +52,14 @@ class Audit:
 
 def audit(path: Path, problem: Problem) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance."""
-    if broken := _broken_curves(path):
+    if broken := _broken_parts(path):
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = _drive(path)
     findings = [*_end_findings(path, problem), *_joint_findings(path, starts, ends), *_turn_findings(path, problem)]
     obstacles = _obstacles_of(problem)
-    least, where = _least_clearance(arcs, obstacles, problem.vehicle.robot_radius)
-    if least < problem.vehicle.robot_radius - CONTACT:
+    need = max(problem.vehicle.robot_radius, POINT)
+    least, where = _least_clearance(arcs, obstacles, need)
+    if least < need - CONTACT:
         findings.append(f"at ({where[0]:.3f}, {where[1]:.3f}) the clearance is {least:.6f} m, "
                         f"less than the robot's radius, {problem.vehicle.robot_radius:g} m")
     turning = [curve.radius for curve in path.curves if _turns(curve)]
@@ -80,12 +84,14 @@ class _Arcs:
         return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
 
 
-def _broken_curves(path: Path) -> tuple[str, ...]:
-    """A sentence for each curve that cannot be driven."""
-    return tuple(f"curve {i} cannot be driven: start {curve.start}, radius {curve.radius}, lengths {curve.lengths}"
+def _broken_parts(path: Path) -> tuple[str, ...]:
+    """A sentence for each pose that is none and each curve that cannot be driven."""
+    poses = [f"the path's {name} is {pose}" for name, pose in (("start", path.start), ("end", path.end))
+             if not all(map(math.isfinite, pose))]
+    return (*poses, *(f"curve {i} cannot be driven: start {curve.start}, radius {curve.radius}, lengths {curve.lengths}"
                  for i, curve in enumerate(path.curves)
                  if not (all(map(math.isfinite, (*curve.start, curve.radius, *curve.lengths)))
-                         and curve.radius > 0 and min(curve.lengths) >= 0))
+                         and curve.radius > 0 and min(curve.lengths) >= 0)))
 
 
 def _turns(curve) -> bool:
@@ -171,12 +177,18 @@ def _obstacles_of(problem: Problem) -> _Obstacles:
 
 
 def _grid_obstacles(grid: GridMap, allow_unknown: bool) -> _Obstacles:
-    """The squares of occupied cells, those side by side in a row as one rectangle, and what is outside the grid."""
+    """The squares of occupied cells, joined to rectangles, and what is outside the grid."""
     blocked = np.pad(grid.blocked(allow_unknown).astype(np.int8), ((0, 0), (1, 1)))
     change = np.diff(blocked, axis=1)
     row, left = np.nonzero(change == 1)
     right = np.nonzero(change == -1)[1]
-    return _Obstacles(_rectangles(grid, 0, 0, *grid.data.shape[::-1]), _rectangles(grid, left, row, right, row + 1))
+    # Cells side by side in a row are one run; runs of equal extent one above the other are one rectangle.
+    order = np.lexsort((row, right, left))
+    row, left, right = row[order], left[order], right[order]
+    goes_on = (np.diff(left) == 0) & (np.diff(right) == 0) & (np.diff(row) == 1)
+    first, last = np.append(True, ~goes_on), np.append(~goes_on, True)
+    solids = _rectangles(grid, left[first], row[first], right[first], row[last] + 1) if len(row) else np.array([])
+    return _Obstacles(_rectangles(grid, 0, 0, *grid.data.shape[::-1]), solids)
 
 
 def _rectangles(grid: GridMap, left, low, right, high) -> np.ndarray:
@@ -191,7 +203,8 @@ def _rectangles(grid: GridMap, left, low, right, high) -> np.ndarray:
 
 def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[float, tuple[float, float]]:
     """The least clearance and where it is; pieces are halved until none can hide contact or a clearance much less."""
-    pieces = np.maximum(np.ceil(arcs.length / FIRST_PIECE), 1).astype(int)
+    longest = max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION)
+    pieces = np.maximum(np.ceil(arcs.length / longest), 1).astype(int)
     index = np.repeat(np.arange(len(pieces)), pieces)
     nth = np.arange(len(index)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     size = (arcs.length / pieces)[index]

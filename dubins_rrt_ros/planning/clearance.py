@@ -20,7 +20,7 @@ from .problem import Pose
 #: A sample of a curve is free with this much more than the needed clearance [m]; it bounds the walk's shortest step.
 MARGIN = 0.0005
 #: About how many raster cells lie over a polygon map.
-POLYGON_CELLS = 40_000
+POLYGON_CELLS = 15_000
 
 _fields: WeakKeyDictionary[Map, dict[bool, "ClearanceField"]] = WeakKeyDictionary()
 
@@ -50,7 +50,7 @@ class ClearanceField:
         """The exact clearance at (..., 2) points [m]; 0 in obstacles and outside the map."""
         points = np.asarray(points, dtype=float)
         out = np.empty(points.shape[:-1])
-        self.kernel.distances(np.ascontiguousarray(points.reshape(-1, 2)), out.reshape(-1))
+        self.kernel.distances(np.require(points.reshape(-1, 2), requirements="CW"), out.reshape(-1))
         if self._polygons is not None:  # whose kernel gives the distance to their edges from both sides
             out[~shapely.contains_xy(self._polygons, points[..., 0], points[..., 1])] = 0
         return out

@@ -35,7 +35,8 @@ class DubinsCurve:
     @property
     def length(self) -> float:
         """Its length [m]."""
-        return sum(self.lengths)
+        first, second, third = self.lengths
+        return first + second + third
 
     @property
     def end(self) -> Pose:
@@ -92,7 +93,8 @@ def candidates(start: Pose, goal: Pose, radius: float) -> dict[str, DubinsCurve]
 
 def lengths(starts: np.ndarray, goals: np.ndarray, radius: float) -> np.ndarray:
     """The lengths [m] of the shortest curves between (..., 3) arrays of poses, which are broadcast against each other."""
-    starts, goals = np.broadcast_arrays(np.asarray(starts, dtype=float), np.asarray(goals, dtype=float))
-    out = np.empty(starts.shape[:-1])
-    _kernel.shortest_lengths(*(np.ascontiguousarray(a.reshape(-1, 3)) for a in (starts, goals)), radius, out.reshape(-1))
+    shape = np.broadcast_shapes(np.shape(starts), np.shape(goals))
+    both = (np.broadcast_to(np.asarray(poses, dtype=float), shape).reshape(-1, 3) for poses in (starts, goals))
+    out = np.empty(shape[:-1])
+    _kernel.shortest_lengths(*(np.require(poses, requirements="CW") for poses in both), radius, out.reshape(-1))
     return out

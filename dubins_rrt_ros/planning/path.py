@@ -24,7 +24,10 @@ class Path:
     @property
     def length(self) -> float:
         """Its length [m]."""
-        return sum(curve.length for curve in self.curves)
+        total = 0.0  # not sum(), which compensates for rounding since Python 3.12 and so differs from the tree's costs
+        for curve in self.curves:
+            total += curve.length
+        return total
 
     def poses(self, spacing: float) -> np.ndarray:
         """(n, 3) float64 poses at most `spacing` [m] apart; start, end and every joint between two arcs are among them."""

@@ -66,16 +66,17 @@ class Tree:
         return Path(tuple(self.poses[0].tolist()), end, tuple(reversed(curves)))
 
     def segments(self, spacing: float) -> np.ndarray:
-        """(m, 2, 2) float64: straight pieces, at most `spacing` [m] long, of all edges: ends by x and y [m]."""
-        total = self.lengths[1:].sum(axis=1)
-        steps = np.maximum(np.ceil(total / spacing).astype(np.int64), 1)
-        edge = np.repeat(np.arange(1, len(self)), steps)
-        nth = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
-        out = np.empty((len(edge), 2, 2))
-        share = total[edge - 1] / steps[edge - 1]
+        """(m, 2, 2) float64: ends, by x and y [m], of the straight pieces that draw all edges; turns in pieces of `spacing` [m]."""
+        turning = np.array([[turn != "S" for turn in word] for word in WORDS])[self.words]
+        pieces = np.where(turning, np.ceil(self.lengths / spacing), self.lengths > 0).astype(np.int64).ravel()
+        arc = np.repeat(np.arange(len(pieces)), pieces)
+        nth = np.arange(len(arc)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        begins = (np.cumsum(self.lengths, axis=1) - self.lengths).ravel()
+        piece = self.lengths.ravel()[arc] / pieces[arc]
+        out = np.empty((len(arc), 2, 2))
         for end in (0, 1):
-            _dubins.edge_points(self.poses, self.parents, self.words, self.lengths, self.radius, edge, (nth + end) * share,
-                                out[:, end])
+            _dubins.edge_points(self.poses, self.parents, self.words, self.lengths, self.radius, arc // 3,
+                                begins[arc] + (nth + end) * piece, out[:, end])
         return out
 
     def check(self, field: ClearanceField | None = None, need: float = 0.0) -> None:
@@ -94,6 +95,8 @@ class Tree:
             ancestor = np.where(ancestor >= 0, ancestor[ancestor], -1)
         if (ancestor >= 0).any():
             raise TreeError(f"node {int(np.argmax(ancestor >= 0))} is below a cycle")
+        if not (self.lengths >= 0).all():
+            raise TreeError(f"node {int(np.argmin((self.lengths >= 0).all(axis=1)))} has an arc that is not at least 0 long")
         edges = self.lengths[1:, 0] + self.lengths[1:, 1] + self.lengths[1:, 2]
         wrong = np.flatnonzero(self.costs[1:] != self.costs[parents[1:]] + edges) + 1
         if len(wrong):
@@ -105,7 +108,8 @@ class Tree:
         curve = self.curve_to(node)
         x, y, theta = self.poses[node]
         end = curve.end
-        if math.hypot(end[0] - x, end[1] - y) > 1e-9 * (1 + curve.length) or abs(math.remainder(end[2] - theta, math.tau)) > 1e-9:
+        off, turned = math.hypot(end[0] - x, end[1] - y), abs(math.remainder(end[2] - theta, math.tau))
+        if not (off <= 1e-9 * (1 + curve.length) and turned <= 1e-9):
             raise TreeError(f"the edge to node {node} ends at {end}, not at ({x}, {y}, {theta})")
         if field is not None and not field.curve_is_free(curve, need):
             raise TreeError(f"the edge to node {node} does not keep the clearance {need} m")

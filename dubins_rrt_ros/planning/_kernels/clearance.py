@@ -5,9 +5,9 @@ A field holds, for each cell of a raster over the map, a lower bound of the clea
 not decide, the exact distance does: to the squares of a grid's occupied cells, or to the edges of polygons.
 
 What the walk guarantees. The clearance changes by at most a metre per metre (it is 1-Lipschitz). A sample is taken as free
-where its clearance is at least `need + margin`; the next one lies `clearance - need + margin` ahead. Between two such samples
-s apart, with clearances c and c', the clearance is at least (c + c' - s) / 2 >= need. So a curve that passes has a clearance
-of at least `need` everywhere, and one that keeps `need + margin` always passes.
+where its clearance is at least `need + margin`; the next one lies `clearance - need + margin / 2` ahead. Between two such
+samples s apart, with clearances c and c', the clearance is at least (c + c' - s) / 2 >= need + margin / 4. So a curve that
+passes has a clearance above `need` everywhere, and one that keeps `need + margin` always passes.
 """
 
 import cython
@@ -82,7 +82,7 @@ class Clearance:
             found = self.at_least(px, py, worth_exact)
             if found < need + self.margin:
                 return -1
-            s += found - need + self.margin
+            s += found - need + self.margin / 2
         return s - length
 
     @cython.cfunc

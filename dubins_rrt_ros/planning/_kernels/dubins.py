@@ -36,6 +36,8 @@ ROUNDING = cython.declare(cython.double, 1e-12)
 NEARLY_NONE = cython.declare(cython.double, 1e-6)
 #: ... are taken as none where the end then is off by no more than this, in turning radii per turning radius of distance.
 FIT = cython.declare(cython.double, 2e-13)
+#: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
+COSINE_ERROR = cython.declare(cython.double, 1e-14)
 NO_CURVE = cython.declare(cython.double, 1e300)
 
 
@@ -139,8 +141,8 @@ def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q
 @cython.exceptval(check=False)
 def turn_at_least(cos_turn: cython.double, sin_turn: cython.double) -> cython.double:
     """A lower bound of a turn in [0, 2 pi): its chord, which is at most the turn and at least 2 / pi of a turn up to pi."""
-    chord: cython.double = sqrt(max(2 - 2 * cos_turn, 0.0))
-    return chord if sin_turn > -2 * NEARLY_NONE else TWO_PI - PI / 2 * chord
+    chord: cython.double = sqrt(max(2 - 2 * cos_turn - COSINE_ERROR, 0.0))
+    return chord if sin_turn > -2 * NEARLY_NONE else TWO_PI - PI / 2 * (chord + NEARLY_NONE)
 
 
 @cython.cfunc

@@ -25,6 +25,8 @@ else:
 #: A smaller gain is rounding, and no reason to rewire [m].
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
 NO_WAY = cython.declare(cython.double, 1e300)
+#: By how much the sum of a step's arcs may exceed it, relatively.
+ROUNDING = cython.declare(cython.double, 1e-9)
 
 
 @cython.cclass
@@ -39,6 +41,7 @@ class Grower:
     clearance: Clearance
     need: cython.double
     step: cython.double
+    longest: cython.double
     near_factor: cython.double
     goal_x: cython.double
     goal_y: cython.double
@@ -62,6 +65,7 @@ class Grower:
         self.tree = tree
         self.clearance = clearance
         self.need, self.step, self.near_factor = need, step, near_factor
+        self.longest = step * (1 + ROUNDING) if step > 0 else NO_WAY
         self.goal_x, self.goal_y, self.goal_theta = goal
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
         self.to = NearSet(tree, most_near)
@@ -136,7 +140,7 @@ class Grower:
         if not self.clearance.free(x, y, self.need):
             return
         near: cython.int = cython.cast(cython.int, ceil(self.near_factor * log(self.tree.size + 1)))
-        self.to.collect_nearest(x, y, theta, near)
+        self.to.collect_nearest(x, y, theta, near, self.longest)
         node: cython.int
         if self.to.keys[0] == 0:
             # The goal is drawn again and again; once it is in the tree, that is another try to reach it from elsewhere.
@@ -154,7 +158,7 @@ class Grower:
     def steer(self, x: cython.double, y: cython.double, theta: cython.double
               ) -> tuple[cython.double, cython.double, cython.double, cython.int, cython.double, cython.double, cython.double]:
         """The pose, and the edge to it, that lies from the closest node towards the sample, at most a step away."""
-        self.to.collect_nearest(x, y, theta, 1)
+        self.to.collect_nearest(x, y, theta, 1, NO_WAY)
         node: cython.int = self.to.nodes[0]
         word: cython.int = self.to.words[0]
         first: cython.double = self.to.lengths[0, 0]

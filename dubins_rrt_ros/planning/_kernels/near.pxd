@@ -20,7 +20,7 @@ cdef class NearSet:
     cdef void consider(self, int node, double dx, double dy, double bound) noexcept nogil
     cdef void consider_bucket(self, int row, int column) noexcept nogil
     cdef void consider_all(self) noexcept nogil
-    cdef void collect_nearest(self, double x, double y, double theta, int wanted) noexcept nogil
+    cdef void collect_nearest(self, double x, double y, double theta, int wanted, double within) noexcept nogil
 
 cdef class GainSet(NearSet):
     cdef double cost

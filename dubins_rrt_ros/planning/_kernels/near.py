@@ -22,6 +22,8 @@ else:
 
 #: The next near set is guessed to reach this much farther than the last.
 GUESS = cython.declare(cython.double, 1.25)
+#: The least guess, in turning radii: it grows by doubling, which must not begin at 0.
+LEAST_GUESS = cython.declare(cython.double, 1e-3)
 
 
 @cython.cclass
@@ -44,19 +46,20 @@ class NearSet:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def collect_nearest(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int) -> cython.void:
-        """Find the `wanted` nodes with the shortest curves to a pose, at most as many as there is room for.
+    def collect_nearest(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int,
+                        within: cython.double) -> cython.void:
+        """Find the `wanted` nodes with the shortest curves to a pose, of those shorter than `within`, as far as there is room.
 
         A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
         """
         self.wanted = min(min(wanted, self.tree.size), cython.cast(cython.int, self.keys.shape[0]))
-        self.begin(x, y, theta, self.guess)
+        self.begin(x, y, theta, min(self.guess, within))
         self.consider_all()
-        while self.count < self.wanted:
+        while self.count < self.wanted and self.guess < within:
             self.guess *= 2
-            self.begin(x, y, theta, self.guess)
+            self.begin(x, y, theta, min(self.guess, within))
             self.consider_all()
-        self.guess = GUESS * self.reach
+        self.guess = max(GUESS * self.reach, LEAST_GUESS * self.tree.radius)
 
     @cython.cfunc
     @cython.nogil
