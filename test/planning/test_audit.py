@@ -1,0 +1,220 @@
+"""The audit finds every kind of wrong path, and nothing in a right one."""
+
+import ast
+import math
+from dataclasses import replace
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+import shapely
+from cases import naive_clearance, random_maps, random_problem, scaled
+from naive import points_along
+
+from dubins_rrt_ros.planning import DubinsCurve, GridMap, Path, PolygonMap, Problem, Settings, Status, Vehicle, plan
+from dubins_rrt_ros.planning import audit as audit_function
+from dubins_rrt_ros.planning.dubins import shortest
+
+START, VIA, GOAL = (2.0, 2.0, 0.0), (6.0, 4.0, 1.0), (9.0, 9.0, 2.0)
+
+
+def square(kind):
+    """12 by 12 m, with a wall beside the way."""
+    if kind == "polygons":
+        return PolygonMap(shapely.box(0, 0, 12, 12) - shapely.box(7, 1, 8, 2))
+    data = np.zeros((24, 24))
+    data[2:4, 14:16] = 100
+    return GridMap(data, 0.5)
+
+
+@pytest.fixture(params=["grid", "polygons"])
+def case(request):
+    """A problem and a right path of two curves."""
+    problem = Problem(square(request.param), Vehicle(1.0, 0.3), START, GOAL)
+    path = Path(START, GOAL, (shortest(START, VIA, 1.0), shortest(VIA, GOAL, 1.0)))
+    assert audit_function(path, problem).ok
+    return problem, path
+
+
+def with_curve(path, index, **changes):
+    curves = list(path.curves)
+    curves[index] = replace(curves[index], **changes)
+    return replace(path, curves=tuple(curves))
+
+
+def findings(problem, path):
+    verdict = audit_function(path, problem)
+    assert verdict.ok == (not verdict.findings)
+    return "; ".join(verdict.findings)
+
+
+def test_a_right_path_passes_with_its_figures(case):
+    problem, path = case
+    verdict = audit_function(path, problem)
+    assert verdict.findings == ()
+    points = np.concatenate([points_along(c.start, c.word, c.lengths, c.radius, 0.001) for c in path.curves])
+    assert verdict.min_clearance == pytest.approx(naive_clearance(problem.map)(points).min(), abs=0.001)
+    assert verdict.max_curvature == 1.0
+
+
+def test_curvature_is_that_of_the_tightest_turn(case):
+    problem, _ = case
+    wide = Path(START, GOAL, (shortest(START, VIA, 1.3), shortest(VIA, GOAL, 1.1)))
+    assert audit_function(wide, problem).max_curvature == pytest.approx(1 / 1.1)
+    straight = Path(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 0.1, "LSL", (0.0, 4.0, 0.0)),))
+    verdict = audit_function(straight, Problem(problem.map, Vehicle(0.1, 0.3), START, (6.0, 2.0, 0.0)))
+    assert verdict.ok
+    assert verdict.max_curvature == 0
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("off", [1e-5, -0.1])
+def test_a_gap_is_found(case, axis, off):
+    problem, path = case
+    moved = list(VIA)
+    moved[axis] += off
+    assert "before curve 1 the path jumps" in findings(problem, with_curve(path, 1, start=tuple(moved)))
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_curve_left_out_is_found(case, index):
+    problem, path = case
+    assert "the path jumps" in findings(problem, replace(path, curves=(path.curves[index],)))
+    assert "the path jumps" in findings(problem, replace(path, curves=()))
+    assert "the path jumps" in findings(problem, replace(path, curves=path.curves[::-1]))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_wrong_ends_are_found(case, axis):
+    problem, path = case
+    off = [0.0, 0.0, 0.0]
+    off[axis] = 1e-4
+    assert "the path starts at" in findings(problem, replace(path, start=tuple(np.add(path.start, off).tolist())))
+    assert "from the goal" in findings(problem, replace(path, end=tuple(np.add(path.end, off).tolist())))
+    elsewhere = replace(problem, goal=tuple(np.add(problem.goal, off).tolist()))
+    assert "from the goal" in findings(elsewhere, path)
+
+
+def test_the_end_may_use_the_tolerance_and_no_more(case):
+    problem, path = case
+    nearby = replace(problem, goal=(9.1, 9.0, 2.1 + math.tau), goal_tolerance_xy=0.1001, goal_tolerance_yaw=0.1001)
+    assert not findings(nearby, path)
+    assert "from the goal" in findings(replace(nearby, goal_tolerance_xy=0.0999), path)
+    assert "from the goal" in findings(replace(nearby, goal_tolerance_yaw=0.0999), path)
+    assert not findings(replace(nearby, goal_tolerance_yaw=0.0, any_goal_heading=True), path)
+
+
+def test_a_turn_too_tight_is_found(case):
+    problem, path = case
+    tight = Path(START, GOAL, (shortest(START, VIA, 0.999), path.curves[1]))
+    assert "curve 0 turns with a radius of 0.999 m, tighter than 1 m" in findings(problem, tight)
+    assert "curve 0 cannot be driven" in findings(problem, with_curve(path, 0, radius=-1.0))
+
+
+def test_a_negative_length_is_found(case):
+    problem, _ = case
+    back_and_forth = Path(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 1.0, "LSL", (-0.5, 4.0, 0.5)),))
+    assert "curve 0 cannot be driven" in findings(replace(problem, goal=(6.0, 2.0, 0.0)), back_and_forth)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_what_is_no_number_is_found(case, bad, index):
+    problem, path = case
+    lengths, start = list(path.curves[1].lengths), list(path.curves[1].start)
+    lengths[index] = start[index] = bad
+    for changes in ({"lengths": tuple(lengths)}, {"start": tuple(start)}, {"radius": bad}):
+        assert "curve 1 cannot be driven" in findings(problem, with_curve(path, 1, **changes))
+    assert findings(problem, replace(path, start=tuple(start)))
+    assert findings(problem, replace(path, end=tuple(start)))
+
+
+def straight_past(map, gap, radius):
+    """A problem and a path a metre straight along x, `gap` from the map's lower edge."""
+    start, goal = (1.0, gap, 0.0), (2.0, gap, 0.0)
+    return Problem(map, Vehicle(1.0, radius), start, goal), Path(start, goal, (shortest(start, goal, 1.0),))
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+@pytest.mark.parametrize("gap, free", [(0.301, True), (0.299, False), (0.3, True), (0.0, False), (-0.1, False)])
+def test_contact_along_a_straight_line(kind, gap, free):
+    problem, path = straight_past(square(kind), gap, 0.3)
+    found = findings(problem, path)
+    assert ("the clearance is" in found) == (not free)
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_contact_by_a_millimetre_between_any_samples(kind):
+    """A bend's outermost point comes a millimetre too near the wall at x = 12, wherever samples may lie."""
+    for y in np.linspace(5, 5.1, 11):
+        for too_near in (True, False):
+            x = 12 - 0.3 - 1.0 + (0.001 if too_near else -0.001)
+            start, goal = (x, y, 0.0), (x, y + 2, math.pi)
+            path = Path(start, goal, (DubinsCurve(start, 1.0, "LSL", (math.pi / 2, 0.0, math.pi / 2)),))
+            verdict = audit_function(path, Problem(square(kind), Vehicle(1.0, 0.3), start, goal))
+            assert verdict.ok != too_near
+            assert verdict.min_clearance == pytest.approx(12 - x - 1, abs=0.001)
+
+
+@pytest.mark.parametrize("thickness", [0.1, 1e-3, 1e-6])
+@pytest.mark.parametrize("radius", [0.0, 0.2])
+def test_a_path_through_a_thin_wall_is_found(thickness, radius):
+    """Nor may a mere point drive through it."""
+    map = PolygonMap(shapely.box(0, 0, 12, 12) - shapely.box(6, 0, 6 + thickness, 11))
+    for shift in np.linspace(0, 0.1, 7):
+        start, goal = (1.0 + shift, 3.0, 0.0), (11.0, 3.0, 0.0)
+        path = Path(start, goal, (shortest(start, goal, 1.0),))
+        assert "the clearance is" in findings(Problem(map, Vehicle(1.0, radius), start, goal), path)
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_a_path_out_of_the_map_and_back_is_found(kind):
+    start, goal = (11.0, 4.0, 0.0), (11.0, 8.0, math.pi)
+    path = Path(start, goal, (shortest(start, goal, 2.0),))
+    assert "the clearance is" in findings(Problem(square(kind), Vehicle(1.0, 0.1), start, goal), path)
+
+
+def test_unknown_space_counts_unless_it_is_allowed():
+    data = np.zeros((24, 24))
+    data[:, 12] = -1
+    start, goal = (2.0, 6.0, 0.0), (10.0, 6.0, 0.0)
+    path = Path(start, goal, (shortest(start, goal, 1.0),))
+    problem = Problem(GridMap(data, 0.5), Vehicle(), start, goal)
+    assert "the clearance is" in findings(problem, path)
+    assert not findings(replace(problem, allow_unknown=True), path)
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_a_path_that_stays_where_it_is(kind):
+    problem = Problem(square(kind), Vehicle(1.0, 0.3), START, START)
+    verdict = audit_function(Path(START, START, ()), problem)
+    assert verdict.ok
+    assert verdict.min_clearance == pytest.approx(2.0)
+    assert not audit_function(Path(START, START, ()), replace(problem, vehicle=Vehicle(1.0, 2.1))).ok
+
+
+def test_least_clearance_is_that_of_the_naive_twin():
+    rng = np.random.default_rng(5)
+    found = 0
+    for map in random_maps(30)[:16]:
+        problem, clearance = random_problem(rng, map)
+        result = plan(problem, Settings(seed=1, samples=scaled(400, least=60), planner="rrt"))
+        if result.status != Status.NONE:
+            continue
+        points = [points_along(c.start, c.word, c.lengths, c.radius, 0.002) for c in result.path.curves]
+        least = clearance(np.concatenate([[problem.start[:2]], *points])).min()
+        assert result.min_clearance == pytest.approx(least, abs=0.002)
+        found += 1
+    assert found > 3
+
+
+def test_the_audit_shares_no_code_with_the_planner():
+    source = File(audit_function.__globals__["__file__"])
+    imported = set()
+    for node in ast.walk(ast.parse(source.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            imported.add("." * node.level + (node.module or ""))
+            imported.update("." * node.level + name.name for name in node.names if not node.module)
+        elif isinstance(node, ast.Import):
+            imported.update(name.name for name in node.names)
+    assert imported == {"math", "dataclasses", "weakref", "numpy", "shapely", ".map", ".path", ".problem"}

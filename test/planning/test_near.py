@@ -1,0 +1,171 @@
+"""The near sets of RRT*, sample by sample against brute force, on the inner loops themselves."""
+
+import math
+
+import naive
+import numpy as np
+import pytest
+from cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
+
+from dubins_rrt_ros.planning import ClearanceField, Tree
+from dubins_rrt_ros.planning._kernels.grow import Grower
+from dubins_rrt_ros.planning._kernels.tree import SearchTree
+from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning.rrt import MOST_NEAR, NEAR_FACTOR
+
+GAIN = 1e-6
+NEED = 0.2
+
+
+class Inner:
+    """The inner loop on a map, one sample at a time."""
+
+    def __init__(self, map, root, radius, step=0.0):
+        self.field = ClearanceField.of(map)
+        corners = map.corners()
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        self.grown = SearchTree(root, radius, low, high - low)
+        self.grower = Grower(self.grown, self.field.kernel, NEED, step, NEAR_FACTOR, MOST_NEAR,
+                             (1e6, 1e6, 0.0), 0.0, 0.0)
+
+    def add(self, sample, algorithm="rrt_star"):
+        """Give it a sample; whether it became a node."""
+        before = self.grown.size
+        self.grower.reserve(1)
+        getattr(self.grower, algorithm)(np.array([sample], dtype=float), 0, 1)
+        return self.grown.size > before
+
+    @property
+    def tree(self):
+        return Tree.copy_of(self.grown)
+
+    def is_free(self, start, goal):
+        """Whether the shortest curve between two poses is."""
+        return self.field.curve_is_free(shortest(tuple(start.tolist()), tuple(goal.tolist()), self.grown.radius), NEED)
+
+
+def samples_on(map, count, seed=1):
+    """Random poses of a map."""
+    rng = np.random.default_rng(seed)
+    corners = map.corners()
+    points = corners[0] + rng.random((count, 2)) @ (corners[[1, 3]] - corners[0])
+    return np.column_stack([points, rng.uniform(-math.pi, math.pi, count)])
+
+
+def near_count(size):
+    return min(math.ceil(NEAR_FACTOR * math.log(size + 1)), size)
+
+
+MAPS = [empty_map(), empty_map(6.0), boxes_grid(np.random.default_rng(2), boxes=4),
+        holed_polygons(np.random.default_rng(3), count=4)]
+
+
+def first_free_pose(map):
+    field = ClearanceField.of(map)
+    return tuple(next(pose for pose in samples_on(map, 100, seed=9) if field.at(pose[:2]) > 2 * NEED).tolist())
+
+
+@pytest.mark.parametrize("map", MAPS)
+def test_rrt_extends_the_closest_node(map):
+    inner = Inner(map, first_free_pose(map), 0.5)
+    added = 0
+    for sample in samples_on(map, scaled(400, least=60)):
+        before = inner.tree
+        (closest,), (length,) = naive.nearest(before.poses, sample, 0.5, 1)
+        expected = inner.field.at(sample[:2]) >= NEED + 0.001 and inner.is_free(before.poses[closest], sample)
+        if inner.add(sample, "rrt"):
+            after = inner.tree
+            assert after.parents[-1] == closest
+            assert after.lengths[-1].sum() == pytest.approx(length, abs=1e-9)
+            added += 1
+        else:
+            assert not expected
+    assert added > 10
+
+
+@pytest.mark.parametrize("map", MAPS)
+def test_rrt_star_chooses_the_cheapest_free_parent_among_the_near(map):
+    inner = Inner(map, first_free_pose(map), 0.5)
+    added = 0
+    for sample in samples_on(map, scaled(400, least=60)):
+        before = inner.tree
+        near, to_sample = naive.nearest(before.poses, sample, 0.5, near_count(len(before)))
+        cost = before.costs[near] + to_sample
+        free = np.array([inner.is_free(before.poses[node], sample) for node in near])
+        if not inner.add(sample):
+            assert not free.any()
+            continue
+        after = inner.tree
+        assert free.any()
+        assert after.costs[-1] == pytest.approx(cost[free].min(), abs=1e-9)
+        assert after.parents[-1] == near[free][np.argmin(cost[free])]
+        added += 1
+    assert added > 10
+
+
+@pytest.mark.parametrize("map", MAPS)
+def test_rrt_star_rewires_just_those_near_that_gain(map):
+    inner = Inner(map, first_free_pose(map), 0.5)
+    rewired = 0
+    for sample in samples_on(map, scaled(400, least=60)):
+        before = inner.tree
+        _, to_sample = naive.nearest(before.poses, sample, 0.5, near_count(len(before)))
+        if not inner.add(sample):
+            continue
+        after, node = inner.tree, len(before)
+        onward = naive.shortest(sample, before.poses, 0.5)
+        changed = np.flatnonzero(after.parents[:-1] != before.parents)
+        assert (after.parents[changed] == node).all()
+        assert (after.costs[:-1] <= before.costs).all()
+        for other in changed:
+            assert after.lengths[other].sum() == pytest.approx(onward[other], abs=1e-9)
+            assert after.costs[other] < before.costs[other]
+            assert onward[other] <= to_sample[-1] or len(before) == near_count(len(before))
+        gains = after.costs[node] + onward + GAIN < after.costs[:-1]
+        for other in np.flatnonzero((onward < to_sample[-1] - GAIN) & gains):
+            assert not inner.is_free(sample, before.poses[other])
+        rewired += len(changed)
+    assert rewired > (5 if SCALE == 1 else 0)
+
+
+def test_costs_follow_to_all_descendants():
+    inner = Inner(MAPS[1], first_free_pose(MAPS[1]), 0.3)
+    for sample in samples_on(MAPS[1], scaled(600, least=100)):
+        inner.add(sample)
+    tree = inner.tree
+    np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
+    tree.check(inner.field, NEED)
+
+
+@pytest.mark.parametrize("algorithm", ["rrt", "rrt_star"])
+@pytest.mark.parametrize("step", [0.0, 0.7])
+def test_a_pose_drawn_again_adds_no_node_and_ends(algorithm, step):
+    inner = Inner(empty_map(), (0.0, 0.0, 0.0), 0.5, step)
+    for sample in [(0, 0, 0), (0.5, 0, 0), (0.5, 0, 0), (0.5, 0, math.tau), (3, 2, 1), (0.5, 0, 0)]:
+        inner.add(sample, algorithm)
+    poses = inner.tree.poses
+    assert len(poses) == 3
+    assert poses[1].tolist() == [0.5, 0, 0]
+
+
+def test_a_goal_drawn_again_is_tried_from_elsewhere():
+    """Its first parent is a detour; drawn once more it finds the direct way from the root, and adds no node."""
+    inner = Inner(empty_map(), (-8.0, 0.0, 0.0), 1.0, step=0.0)
+    goal = (8.0, 0.0, 2.0)
+    for sample in samples_on(empty_map(), scaled(300, least=60)):
+        inner.add(sample)
+        inner.add(goal)
+    tree = inner.tree
+    (node,) = np.flatnonzero((tree.poses == goal).all(axis=1))
+    assert tree.costs[node] == pytest.approx(shortest((-8.0, 0.0, 0.0), goal, 1.0).length, abs=1e-9)
+    tree.check(inner.field, NEED)
+
+
+@pytest.mark.parametrize("algorithm", ["rrt", "rrt_star"])
+def test_the_step_is_cut_off_the_shortest_curve(algorithm):
+    curve = shortest((0.0, 0.0, 0.0), (-3.0, 4.0, 2.0), 1.0)
+    inner = Inner(empty_map(), curve.start, 1.0, step=2.5)
+    assert inner.add((-3.0, 4.0, 2.0), algorithm)
+    tree = inner.tree
+    np.testing.assert_allclose(tree.poses[1], curve.pose_at(2.5), atol=1e-12)
+    assert tree.costs[1] == pytest.approx(2.5)

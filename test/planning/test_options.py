@@ -1,0 +1,154 @@
+"""Every option of Settings, Vehicle and Problem: what it takes, and what it says when it does not."""
+
+import math
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from dubins_rrt_ros.planning import (
+    GridMap,
+    InvalidPose,
+    OptionError,
+    Problem,
+    Settings,
+    Vehicle,
+    checked_pose,
+    options,
+    values,
+)
+
+MAP = GridMap(np.zeros((4, 4)), 1.0)
+MAKE = {Settings: Settings, Vehicle: Vehicle,
+        Problem: lambda **fields: Problem(MAP, Vehicle(), (1, 1, 0), (2, 2, 0), **fields)}
+OPTIONS = [(cls, item) for cls in MAKE for item in options(cls)]
+of_type = {kind: [(cls, item) for cls, item in OPTIONS if item.type is kind] for kind in (float, int, bool, str)}
+#: Wheelbase and steering angle go together only.
+PAIR = {"wheelbase": {"max_steering_angle": 0.5}, "max_steering_angle": {"wheelbase": 1.0}}
+
+
+def names(kind):
+    return pytest.mark.parametrize("cls, item", of_type[kind], ids=[f"{c.__name__}.{i.name}" for c, i in of_type[kind]])
+
+
+def make(cls, item, value):
+    return MAKE[cls](**{item.name: value}, **(PAIR.get(item.name, {}) if value else {}))
+
+
+def assert_refused(cls, item, value):
+    with pytest.raises(OptionError) as refusal:
+        make(cls, item, value)
+    message = str(refusal.value)
+    assert message.startswith(f"{item.name} is {value!r}; it takes ")
+    assert item.allowed() in message
+    assert item.help in message
+    assert "\n" not in message
+
+
+def test_the_options_are_those_of_the_contract():
+    assert {item.name for item in options(Settings)} >= {
+        "planner", "samples", "planning_time", "goal_bias", "step_size", "heading_sampling", "path_spacing", "seed"}
+    assert [item.name for item in options(Vehicle)] == [
+        "turning_radius", "robot_radius", "wheelbase", "max_steering_angle"]
+    assert [item.name for item in options(Problem)] == [
+        "goal_tolerance_xy", "goal_tolerance_yaw", "any_goal_heading", "allow_unknown"]
+    defaults = values(Settings())
+    assert (defaults["planner"], defaults["samples"]) == ("rrt_star", 3000)
+    assert (defaults["planning_time"], defaults["seed"]) == (1.0, -1)
+    assert values(Vehicle())["turning_radius"] == 1.0
+
+
+@pytest.mark.parametrize("cls, item", OPTIONS, ids=[f"{c.__name__}.{i.name}" for c, i in OPTIONS])
+def test_description_and_default(cls, item):
+    assert values(MAKE[cls]())[item.name] == item.default
+    assert item.describe().startswith(item.help)
+    assert item.allowed() in item.describe()
+    assert item.unit in item.describe()
+    assert "\n" not in item.describe()
+
+
+@names(float)
+def test_a_number_takes_its_range_and_integers(cls, item):
+    for value in (item.low, item.high):
+        assert getattr(make(cls, item, value), item.name) == value
+    whole = math.ceil(max(item.low, min(item.high, 1)))
+    if item.low <= whole <= item.high:
+        found = getattr(make(cls, item, whole), item.name)
+        assert type(found) is float
+        assert found == whole
+    beyond = math.nextafter(item.low, -math.inf), math.nextafter(item.high, math.inf)
+    for value in (*beyond, math.nan, math.inf, -math.inf):
+        assert_refused(cls, item, value)
+    for value in ("1", None, True, [1.0], 1j, np.float32(item.default)):
+        assert_refused(cls, item, value)
+
+
+@names(int)
+def test_an_integer_takes_its_range(cls, item):
+    for value in (item.low, item.high):
+        assert getattr(make(cls, item, value), item.name) == value
+    for value in (item.low - 1, item.high + 1, 1.0, 1.5, math.nan, "1", None, True):
+        assert_refused(cls, item, value)
+
+
+@names(bool)
+def test_a_switch_takes_true_and_false(cls, item):
+    for value in (True, False):
+        assert getattr(make(cls, item, value), item.name) is value
+    for value in (1, 0, "true", None, 1.0):
+        assert_refused(cls, item, value)
+
+
+@names(str)
+def test_a_choice_takes_its_choices(cls, item):
+    assert item.choices
+    for value in item.choices:
+        assert getattr(make(cls, item, value), item.name) == value
+    for value in ("", "RRT", item.choices[0] + " ", None, 1):
+        assert_refused(cls, item, value)
+
+
+def test_options_are_frozen():
+    with pytest.raises(FrozenInstanceError):
+        Settings().samples = 5
+    with pytest.raises(FrozenInstanceError):
+        Vehicle().turning_radius = 5.0
+
+
+def test_turning_radius_of_a_wheelbase():
+    vehicle = Vehicle(wheelbase=2.7, max_steering_angle=0.6)
+    assert vehicle.turning_radius == pytest.approx(2.7 / math.tan(0.6))
+    assert Vehicle(turning_radius=5.0, wheelbase=1, max_steering_angle=math.pi / 4).turning_radius == pytest.approx(1)
+
+
+@pytest.mark.parametrize("half", [{"wheelbase": 2.7}, {"max_steering_angle": 0.6}])
+def test_wheelbase_and_steering_angle_go_together(half):
+    with pytest.raises(OptionError, match=r"wheelbase is .* and max_steering_angle .*; set both, or neither"):
+        Vehicle(**half)
+
+
+@pytest.mark.parametrize("pose", [
+    (0, 0), (0, 0, 0, 0), (math.nan, 0, 0), (0, math.inf, 0), (0, 0, -math.inf), "abc", None, 5,
+    (None, 0, 0), ("x", 0, 0), ()])
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_invalid_pose(end, pose):
+    ends = {"start": (1, 1, 0), "goal": (2, 2, 0), end: pose}
+    with pytest.raises(InvalidPose, match=f"^The {end} pose is .*; give three finite numbers: x .*, y .*, yaw"):
+        Problem(MAP, Vehicle(), **ends)
+
+
+def test_poses_become_floats():
+    problem = Problem(MAP, Vehicle(), np.array([1, 1, 0]), [2, 2, 1])
+    assert problem.start == (1.0, 1.0, 0.0)
+    assert all(type(number) is float for number in problem.start + problem.goal)
+    assert checked_pose("start", (1, 2, 3)) == (1.0, 2.0, 3.0)
+
+
+def test_what_counts_as_an_exact_goal():
+    make = MAKE[Problem]
+    assert make().exact_goal
+    assert not make(goal_tolerance_xy=0.1).exact_goal
+    assert not make(goal_tolerance_yaw=0.1).exact_goal
+    assert not make(any_goal_heading=True).exact_goal
+    assert make(any_goal_heading=True).yaw_tolerance == math.pi
+    assert make(goal_tolerance_yaw=0.3).yaw_tolerance == 0.3

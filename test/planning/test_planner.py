@@ -1,0 +1,311 @@
+"""The contract that every planner meets: it answers each request with a path or a reason, within its limits."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from cases import empty_map, needs_compiled, scaled
+
+from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Settings, Status, Tree, Vehicle, audit, load_map, plan
+from dubins_rrt_ros.share import maps_directory
+
+START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
+VEHICLE = Vehicle(0.5, 0.2)
+
+
+@pytest.fixture(params=["rrt", "rrt_star"])
+def planner(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=["yaml", "geojson"])
+def maze(request):
+    map = load_map(maps_directory() / f"maze.{request.param}")
+    return Problem(map, Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
+
+
+def settings(planner, **options):
+    budget = {"samples": scaled(3000, least=300), "planning_time": 60.0}
+    return Settings(**{"planner": planner, "seed": 1, **budget, **options})
+
+
+def hard_to_reach():
+    """The goal is behind a gap that is wide enough for the disc, not for its turning radius."""
+    data = np.zeros((40, 40))
+    data[:, 20] = 100
+    data[20, 20] = 0
+    map = GridMap(data, 0.5, (-10.0, -10.0, 0.0))
+    return Problem(map, Vehicle(9.0, 0.24), (-5.0, -8.0, math.pi / 2), (5.0, -8.0, -math.pi / 2))
+
+
+def walled(value=100):
+    data = np.zeros((40, 40))
+    data[:, 19:21] = value
+    return GridMap(data, 0.5, (-10.0, -10.0, 0.0))
+
+
+def assert_refused(result, status, *words):
+    assert result.status == status
+    assert result.path is result.length is result.gap is None
+    assert result.audit == ""
+    assert len(result.tree) >= 1
+    assert "\n" not in result.message
+    for word in words:
+        assert word in result.message
+
+
+def test_solves(planner):
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))
+    assert result.status == Status.NONE
+    assert result.audit == "ok"
+    assert result.path.start == START
+    assert result.path.end == GOAL
+    poses = result.path.poses(0.05)
+    assert tuple(poses[0]) == START
+    assert tuple(poses[-1]) == GOAL
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.05 + 1e-9
+    assert result.length >= result.lower_bound
+    assert result.gap == pytest.approx(result.length / result.lower_bound - 1)
+    assert result.max_curvature == pytest.approx(2.0)
+    assert result.min_clearance >= 0.2
+    assert 0 < result.time_to_first <= result.planning_time
+    assert f"{result.length:.2f} m" in result.message
+    result.tree.check()
+
+
+@needs_compiled
+@pytest.mark.parametrize("seed", range(5))
+def test_solves_the_maze(maze, planner, seed):
+    result = plan(maze, settings(planner, seed=seed))
+    assert result.status == Status.NONE
+    assert audit(result.path, maze).ok
+    assert 20 < result.length < (25 if planner == "rrt_star" else 60)
+
+
+@pytest.mark.parametrize("x, y", [(6.83, 7.402), (2.324, 4.09), (5.914, 2.929), (7.386, 7.685), (3.0, 5.0)])
+def test_a_point_does_not_drive_through_a_wall(planner, x, y):
+    """A vehicle without size, and a wall of a centimetre between it and the goal."""
+    wall = shapely.box(10, 1, 10.01, 9)
+    problem = Problem(PolygonMap(shapely.box(0, 0, 20, 10) - wall), Vehicle(0.5, 0.0), (x, y, 0.0), (18.0, y, 0.0))
+    result = plan(problem, settings(planner, goal_bias=0.5, samples=scaled(1000, least=200)))
+    assert result.status in (Status.NONE, Status.NO_VALID_PATH)
+    if result.path:
+        assert not shapely.LineString(result.path.poses(0.005)[:, :2]).intersects(wall)
+
+
+def test_the_time_limit_ends_it(planner, monkeypatch):
+    now = iter(np.arange(1e6) / 100)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
+    result = plan(hard_to_reach(), settings(planner, samples=1_000_000, planning_time=0.5))
+    assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "of 1000000 samples drawn", "allow more time")
+    assert 0 < result.samples < 1_000_000
+    assert 0.5 <= result.planning_time < 1.0
+    assert f"{len(result.tree)} tree nodes" in result.message
+
+
+def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
+    now = iter(np.arange(1e6) / 100)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL),
+                  settings("rrt_star", goal_bias=0.5, samples=1_000_000, planning_time=0.5))
+    assert result.status == Status.NONE
+    assert result.samples < 1_000_000
+    assert not result.cancelled
+
+
+def test_the_sample_budget_ends_it(planner):
+    result = plan(hard_to_reach(), settings(planner, samples=200))
+    assert_refused(result, Status.NO_VALID_PATH, "200 of 200 samples", "allow more samples")
+    assert result.samples == 200
+
+
+def test_cancelled_before_the_first_path(planner):
+    asked = []
+    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 3)
+    assert_refused(result, Status.CANCELLED, "Cancelled before a first path", "samples drawn")
+    assert len(asked) == 3
+    assert 0 < result.samples < settings(planner).samples
+
+
+def test_cancelled_at_once(planner):
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: True)
+    assert_refused(result, Status.CANCELLED)
+    assert result.samples == 0
+    assert len(result.tree) == 1
+
+
+def test_cancelled_after_the_first_path_gives_the_best_so_far():
+    found = []
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star"), cancel=lambda: bool(found),
+                  on_progress=lambda progress: found.append(progress.length) if progress.length else None)
+    assert result.status == Status.NONE
+    assert result.cancelled
+    assert result.length == pytest.approx(found[-1])
+    assert result.samples < settings("rrt_star").samples
+    assert "cancelled after" in result.message
+
+
+@pytest.mark.parametrize("map", [walled(), PolygonMap(shapely.box(-10, -10, 10, 10) - shapely.box(-0.5, -11, 0.5, 11))])
+def test_proves_that_there_is_no_way(planner, map):
+    result = plan(Problem(map, VEHICLE, START, GOAL), settings(planner))
+    assert_refused(result, Status.NO_VALID_PATH, "No path exists", "robot_radius 0.2 m")
+    assert result.samples == 0
+    assert len(result.tree) == 1
+
+
+def test_a_tolerance_may_reach_around_the_wall(planner):
+    """The goal's disc reaches through the wall to the start's side, so nothing is proved and a path is found."""
+    goal = (1.0, -8.0, 0.0)
+    assert plan(Problem(walled(), VEHICLE, START, goal), settings(planner)).status == Status.NO_VALID_PATH
+    problem = Problem(walled(), VEHICLE, START, goal, goal_tolerance_xy=3.0, any_goal_heading=True)
+    result = plan(problem, settings(planner))
+    assert result.status == Status.NONE
+    assert result.path.end[0] < -0.5
+
+
+def test_same_seed_same_bytes(planner, maze):
+    budget = settings(planner, samples=scaled(1000, least=100))
+    one, other = (plan(maze, budget) for _ in range(2))
+    assert one.status == other.status
+    assert one.path == other.path
+    assert one.samples == other.samples
+    for name in ("poses", "parents", "costs", "words", "lengths"):
+        assert getattr(one.tree, name).tobytes() == getattr(other.tree, name).tobytes()
+
+
+@pytest.mark.parametrize("pose", [(-10.5, 0, 0), (0, 10.01, 0), (1e9, 0, 0)])
+def test_outside_the_map(planner, pose):
+    words = (f"({pose[0]:.2f}, {pose[1]:.2f})", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the pose")
+    result = plan(Problem(empty_map(), VEHICLE, pose, GOAL), settings(planner))
+    assert_refused(result, Status.START_OUTSIDE_MAP, "Start", *words)
+    result = plan(Problem(empty_map(), VEHICLE, START, pose), settings(planner))
+    assert_refused(result, Status.GOAL_OUTSIDE_MAP, "Goal", *words)
+
+
+@pytest.mark.parametrize("pose, clearance", [((0, 0, 0), "0 m"), ((0.6, 0, 0), "0.1 m"), ((9.9, 0, 0), "0.1 m")])
+def test_occupied(planner, pose, clearance):
+    words = (f"is occupied: clearance {clearance}", "needed 0.2005 m", "robot_radius")
+    result = plan(Problem(walled(), VEHICLE, pose, GOAL), settings(planner))
+    assert_refused(result, Status.START_OCCUPIED, "Start", *words)
+    result = plan(Problem(walled(), VEHICLE, START, pose), settings(planner))
+    assert_refused(result, Status.GOAL_OCCUPIED, "Goal", *words)
+    assert "unknown" not in result.message
+
+
+def test_unknown_space_is_named_as_the_cause(planner):
+    problem = Problem(walled(-1), VEHICLE, (0.0, 0.0, 0.0), GOAL)
+    assert_refused(plan(problem, settings(planner)), Status.START_OCCUPIED, "only unknown space", "allow_unknown")
+    allowed = Problem(walled(-1), VEHICLE, (0.0, 0.0, 0.0), GOAL, allow_unknown=True)
+    assert plan(allowed, settings(planner)).status == Status.NONE
+
+
+def test_start_equal_to_goal(planner):
+    result = plan(Problem(empty_map(), VEHICLE, START, (*START[:2], START[2] + math.tau)), settings(planner))
+    assert result.status == Status.NONE
+    assert (result.length, result.gap, result.samples, result.audit) == (0, 0, 0, "ok")
+    assert result.path.poses(0.05).tolist() == [list(START)]
+
+
+def test_start_within_the_tolerance(planner):
+    near = (START[0] + 0.3, START[1], START[2] + 0.2)
+    tolerances = {"goal_tolerance_xy": 0.31, "goal_tolerance_yaw": 0.21}
+    result = plan(Problem(empty_map(), VEHICLE, START, near, **tolerances), settings(planner))
+    assert result.length == 0
+    assert "it ends 0.300 m and 0.200 rad from the goal" in result.message
+
+
+@pytest.mark.parametrize("tolerance", [
+    {"goal_tolerance_xy": 0.5}, {"goal_tolerance_yaw": 0.3}, {"goal_tolerance_xy": 0.5, "goal_tolerance_yaw": 0.3},
+    {"any_goal_heading": True}, {"goal_tolerance_xy": 0.5, "any_goal_heading": True}])
+def test_goal_with_tolerance(planner, tolerance):
+    problem = Problem(empty_map(), VEHICLE, START, GOAL, **tolerance)
+    result = plan(problem, settings(planner))
+    assert result.status == Status.NONE
+    off = math.dist(result.path.end[:2], GOAL[:2])
+    turned = abs(math.remainder(result.path.end[2] - GOAL[2], math.tau))
+    assert off <= problem.goal_tolerance_xy
+    assert turned <= problem.yaw_tolerance
+    assert f"it ends {off:.3f} m and {turned:.3f} rad from the goal" in result.message
+    assert result.length >= result.lower_bound
+    assert result.lower_bound == pytest.approx(math.dist(START[:2], GOAL[:2]) - problem.goal_tolerance_xy)
+
+
+def test_progress_tells_of_every_better_path():
+    told, snapshots = [], []
+
+    def on_progress(progress):
+        told.append(progress)
+        snapshots.append(progress.snapshot())
+
+    problem = Problem(walled_with_a_gap(), VEHICLE, START, GOAL)
+    result = plan(problem, settings("rrt_star"), on_progress=on_progress)
+    assert result.status == Status.NONE
+    better = [progress.length for progress in told if progress.improved]
+    assert len(better) >= 1
+    assert better == sorted(better, reverse=True)
+    assert len(set(better)) == len(better)
+    assert better[-1] == pytest.approx(result.length, abs=1e-5)
+    samples = [progress.samples for progress in told]
+    assert samples == sorted(samples)
+    for progress, snapshot in zip(told, snapshots, strict=True):
+        assert snapshot.samples == progress.samples
+        assert (snapshot.path is None) == (progress.length is None)
+        if snapshot.path:
+            assert snapshot.audit == "ok"
+            assert audit(snapshot.path, problem).ok
+            assert snapshot.length == pytest.approx(progress.length)
+            assert isinstance(snapshot.tree, Tree)
+
+
+def walled_with_a_gap():
+    grid = walled()
+    data = np.array(grid.data)
+    data[30:, :] = 0
+    return GridMap(data, grid.resolution, grid.origin)
+
+
+def test_progress_of_rrt_has_one_path():
+    told = []
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt"), on_progress=told.append)
+    assert [progress.length for progress in told if progress.improved] == [pytest.approx(result.length)]
+
+
+def test_a_fresh_seed_is_reported_and_repeats(planner):
+    problem = Problem(empty_map(), VEHICLE, START, GOAL)
+    one, other = (plan(problem, settings(planner, seed=-1, samples=100)) for _ in range(2))
+    assert one.settings.seed >= 0
+    assert one.settings.seed != other.settings.seed
+    again = plan(problem, settings(planner, seed=one.settings.seed, samples=100))
+    assert again.tree.poses.tobytes() == one.tree.poses.tobytes()
+
+
+def test_a_vehicle_with_a_wheelbase(planner):
+    vehicle = Vehicle(wheelbase=0.5, max_steering_angle=0.4, robot_radius=0.2)
+    result = plan(Problem(empty_map(), vehicle, START, GOAL), settings(planner))
+    assert result.status == Status.NONE
+    assert {curve.radius for curve in result.path.curves} == {0.5 / math.tan(0.4)}
+    assert result.max_curvature == pytest.approx(math.tan(0.4) / 0.5)
+
+
+def test_a_path_that_fails_the_audit_is_a_defect_and_not_a_path(planner, monkeypatch):
+    from dubins_rrt_ros.planning import planner as module
+
+    def strict(path, problem):
+        return audit(path, Problem(problem.map, Vehicle(0.5, 5.0), problem.start, problem.goal))
+
+    monkeypatch.setattr(module, "audit", strict)
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))
+    assert result.status == Status.UNKNOWN
+    assert result.path is None
+    assert "the clearance is" in result.audit
+    assert "defect in the planner" in result.message
+    assert result.audit in result.message
+
+
+def test_the_numbers_of_the_statuses():
+    assert {status.name: int(status) for status in Status} == {
+        "NONE": 0, "UNKNOWN": 200, "TF_ERROR": 202, "START_OUTSIDE_MAP": 203, "GOAL_OUTSIDE_MAP": 204,
+        "START_OCCUPIED": 205, "GOAL_OCCUPIED": 206, "TIMEOUT": 207,
+        "NO_VALID_PATH": 208, "NO_MAP": 210, "NO_START": 211, "INVALID_POSE": 212,
+        "CANCELLED": 213}
