@@ -1,0 +1,173 @@
+"""Messages to the library's types and back: pure functions."""
+
+import array
+import math
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Quaternion
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
+from std_msgs.msg import Header
+
+from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, rasterise
+from dubins_rrt_ros.planning.problem import Pose
+
+#: How far a quaternion's norm may be from 1: three decimals of each component are enough.
+NORM_TOLERANCE = 1e-3
+#: How far a pose's z axis may lean [rad].
+TILT_TOLERANCE = 0.01
+#: The cells of a polygon map that is published as a grid, to be looked at:
+#: how small [m], and how many at most; that many take about 2 s.
+RASTER_RESOLUTION, RASTER_CELLS = 0.05, 500_000
+
+
+def pose_from(name: str, message: PoseStamped | PoseWithCovarianceStamped) -> Pose:
+    """The (x [m], y [m], yaw [rad]) of a stamped pose, yaw in (-pi, pi]; its height does not matter.
+
+    Raises:
+        InvalidPose: it is not finite, no rotation or tilted; `name` is in the message.
+    """
+    pose = message.pose.pose if isinstance(message, PoseWithCovarianceStamped) else message.pose
+    p = pose.position
+    if not all(map(math.isfinite, (p.x, p.y, p.z))):
+        raise InvalidPose(f"The {name} pose is at x {p.x}, y {p.y}, z {p.z}; give finite metres.")
+    return p.x, p.y, _yaw(f"The {name} pose", pose.orientation, InvalidPose)
+
+
+def pose_message(pose: Pose) -> PoseMessage:
+    """An (x, y, yaw) as a message, with w >= 0 in its quaternion."""
+    message = PoseMessage()
+    _fill(message, *_rows(np.array([pose]))[0])
+    return message
+
+
+def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
+    """(n, 3) poses as a path; without poses it is empty and tells that there is none."""
+    message = PathMessage(header=Header(stamp=stamp, frame_id=frame))
+    for row in _rows(poses):
+        stamped = PoseStamped()
+        stamped.header = message.header
+        _fill(stamped.pose, *row)
+        message.poses.append(stamped)
+    return message
+
+
+def _rows(poses: np.ndarray) -> list[list[float]]:
+    """Of each pose x, y and the quaternion's z, w, as Python floats: a numpy number in a field goes out as garbage."""
+    x, y, yaw = np.asarray(poses, dtype=float).reshape(-1, 3).T
+    half = (yaw - 2 * math.pi * np.round(yaw / (2 * math.pi))) / 2
+    return np.stack([x, y, np.sin(half), np.cos(half)], axis=1).tolist()
+
+
+def _fill(message: PoseMessage, x: float, y: float, z: float, w: float) -> None:
+    # To fill the fields that are there takes half the time of making new ones, which counts with hundreds of poses.
+    message.position.x, message.position.y = x, y
+    message.orientation.z, message.orientation.w = z, w
+
+
+def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap:
+    """The map of a message.
+
+    Raises:
+        MapError: it is in another frame than `frame`, has no cells or too many, or its fields contradict each other.
+    """
+    info, name = message.info, "the map message"
+    if message.header.frame_id not in ("", frame):
+        raise MapError(f"{name} is in frame '{message.header.frame_id}', not in '{frame}'; publish it in '{frame}' "
+                       "or set global_frame")
+    cells = info.width * info.height
+    if cells > max_map_cells:
+        raise MapError(f"{name} has {info.width} x {info.height} cells, more than max_map_cells ({max_map_cells}); "
+                       "publish a smaller map or raise max_map_cells")
+    if len(message.data) != cells or cells == 0:
+        raise MapError(f"{name} has {len(message.data)} values for {info.width} x {info.height} cells; "
+                       "give width times height values, at least one")
+    yaw = _yaw(f"{name}: its origin", info.origin.orientation, MapError)
+    data = np.frombuffer(message.data, dtype=np.int8).reshape(info.height, info.width)
+    # The field is a float32; the decimal it stands for gives the same map as the file that was published.
+    resolution = float(str(np.float32(info.resolution)))
+    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name)
+
+
+def grid_message(grid: GridMap, frame: str, stamp: Time) -> OccupancyGrid:
+    """A grid map as a message."""
+    message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame))
+    message.info.map_load_time = stamp
+    message.info.height, message.info.width = grid.data.shape
+    message.info.resolution = grid.resolution
+    message.info.origin = pose_message(grid.origin)
+    # An array of bytes is taken over as it is; a list of four million numbers takes 190 ms.
+    message.data = array.array("b", grid.data.tobytes())
+    return message
+
+
+def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
+    """A map as a grid that can be published."""
+    if isinstance(loaded, GridMap):
+        return loaded
+    width, height = np.ptp(loaded.corners(), axis=0)
+    return rasterise(loaded, max(RASTER_RESOLUTION, math.sqrt(width * height / RASTER_CELLS)))
+
+
+def status_message(node: str, status: Status, message: str, *, plan_id: int = 0, revision: int = 0,
+                   plan: Plan | None = None, map_id: str = "") -> DiagnosticStatus:
+    """A planning event for a person and for a program.
+
+    Args:
+        node: the fully qualified name of the node.
+        status: how the request ended or stands.
+        message: one sentence that says so.
+        plan_id, revision: which answer to which request; 0 where it belongs to none.
+        plan: the answer, where a planner ran; figures that there are not stay empty.
+        map_id: which map it is about.
+    """
+    values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
+    values |= _figures(plan) | {"map_id": map_id}
+    return DiagnosticStatus(level=_level(status, plan), name=f"{node}: planner", message=message,
+                            values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()])
+
+
+def _figures(plan: Plan | None) -> dict[str, object]:
+    names = ("planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "time_to_first", "planning_time",
+             "min_clearance", "max_curvature", "audit", "seed")
+    if plan is None:
+        return dict.fromkeys(names)
+    return dict(zip(names, (
+        plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.lower_bound, plan.gap,
+        plan.time_to_first, plan.planning_time, plan.min_clearance, plan.max_curvature, plan.audit, plan.settings.seed,
+    ), strict=True))
+
+
+def _text(value: object) -> str:
+    """All digits of a number, so that it reads back as it was."""
+    if value is None:
+        return ""
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _level(status: Status, plan: Plan | None) -> bytes:
+    if status is Status.NO_MAP:
+        return DiagnosticStatus.STALE
+    if status is Status.CANCELLED:
+        return DiagnosticStatus.WARN
+    if status is not Status.NONE:
+        return DiagnosticStatus.ERROR
+    approximate = plan is not None and plan.path is not None and plan.path.end != plan.problem.goal
+    return DiagnosticStatus.WARN if approximate or (plan is not None and plan.cancelled) else DiagnosticStatus.OK
+
+
+def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:
+    """The turn about z of a quaternion [rad], in (-pi, pi]."""
+    written = f"x {q.x}, y {q.y}, z {q.z}, w {q.w}"
+    norm = math.hypot(q.x, q.y, q.z, q.w)
+    if not abs(norm - 1) <= NORM_TOLERANCE:  # so written, not-a-number is refused too
+        raise error(f"{what} has the quaternion {written}, which is no rotation: its norm is {norm:.6g}; "
+                    "normalise it (no rotation is w 1).")
+    tilt = 2 * math.asin(min(1.0, math.hypot(q.x, q.y) / norm))
+    if tilt > TILT_TOLERANCE:
+        raise error(f"{what} has the quaternion {written}, which leans by {tilt:.3g} rad; "
+                    "turn it about z only (x and y 0).")
+    return math.remainder(2 * math.atan2(q.z, q.w), 2 * math.pi)

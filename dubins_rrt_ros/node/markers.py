@@ -1,0 +1,51 @@
+"""A plan as markers for RViz."""
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Vector3
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from dubins_rrt_ros.planning import Plan
+from dubins_rrt_ros.planning.problem import Pose
+
+from .conversions import pose_message
+
+TREE_COLOR = ColorRGBA(r=0.35, g=0.55, b=0.85, a=0.6)
+PATH_COLOR = ColorRGBA(r=0.90, g=0.30, b=0.10, a=1.0)
+START_COLOR = ColorRGBA(r=0.10, g=0.60, b=0.20, a=1.0)
+GOAL_COLOR = ColorRGBA(r=0.75, g=0.10, b=0.50, a=1.0)
+#: A chord as long as this share of the turning radius strays from its arc by 1 % of the radius.
+CHORD = 0.3
+
+
+def tree_markers(plan: Plan | None, frame: str, stamp: Time) -> MarkerArray:
+    """Clears what was shown, then shows the tree, start, goal and path of `plan`, if there is one."""
+    header = Header(stamp=stamp, frame_id=frame)
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    if plan is not None:
+        radius = plan.problem.vehicle.turning_radius
+        width = 0.02 * radius
+        markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius), width, TREE_COLOR)
+        markers.append(_arrow(header, "start", plan.problem.start, radius, START_COLOR))
+        markers.append(_arrow(header, "goal", plan.problem.goal, radius, GOAL_COLOR))
+        if plan.path is not None:
+            poses = plan.path.poses(min(plan.settings.path_spacing, CHORD * radius))
+            markers += _lines(header, "path", Marker.LINE_STRIP, poses[:, :2], 3 * width, PATH_COLOR)
+    return MarkerArray(markers=markers)
+
+
+def _lines(header: Header, namespace: str, kind: int, points: np.ndarray, width: float,
+           color: ColorRGBA) -> list[Marker]:
+    """One marker for all the lines, or none: RViz complains of lines without points."""
+    points = np.asarray(points, dtype=float).reshape(-1, 2)
+    if len(points) < 2:
+        return []
+    marker = Marker(header=header, ns=namespace, type=kind, action=Marker.ADD, scale=Vector3(x=width), color=color)
+    marker.points = [Point(x=x, y=y, z=0.0) for x, y in points.tolist()]
+    return [marker]
+
+
+def _arrow(header: Header, namespace: str, pose: Pose, radius: float, color: ColorRGBA) -> Marker:
+    return Marker(header=header, ns=namespace, type=Marker.ARROW, action=Marker.ADD, pose=pose_message(pose),
+                  scale=Vector3(x=0.6 * radius, y=0.12 * radius, z=0.12 * radius), color=color)

@@ -1,0 +1,236 @@
+"""Messages to the library's types and back, through the wire format."""
+
+import array
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+import shapely
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
+
+from dubins_rrt_ros.node.conversions import (
+    RASTER_CELLS,
+    as_grid,
+    grid_from,
+    grid_message,
+    path_message,
+    pose_from,
+    pose_message,
+    status_message,
+)
+from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, PolygonMap, Status
+
+STAMP = Time(sec=12, nanosec=34)
+NAN, INF = math.nan, math.inf
+
+
+def stamped(x=1.0, y=2.0, z=0.0, q=(0.0, 0.0, 0.0, 1.0)):
+    pose = PoseMessage(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=q[0], y=q[1], z=q[2], w=q[3]))
+    return PoseStamped(pose=pose)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1e-12, 0.5, -0.5, math.pi / 2, -3.0, 3.14159, math.pi])
+def test_a_pose_survives_the_way_there_and_back(over_the_wire, yaw):
+    message = over_the_wire(PoseStamped(pose=pose_message((-3.25, 7.125, yaw))))
+    x, y, back = pose_from("start", message)
+    assert (x, y) == (-3.25, 7.125)
+    assert back == pytest.approx(yaw, abs=1e-15)
+
+
+@pytest.mark.parametrize(("yaw", "wrapped"), [
+    (2 * math.pi, 0.0), (1.5 * math.pi, -math.pi / 2), (-7.0, 2 * math.pi - 7.0),
+])
+def test_a_yaw_outside_pi_is_wrapped(yaw, wrapped):
+    message = pose_message((0.0, 0.0, yaw))
+    assert message.orientation.w >= 0
+    assert pose_from("start", PoseStamped(pose=message))[2] == pytest.approx(wrapped, abs=1e-14)
+
+
+def test_a_quaternion_and_its_negative_are_one_pose():
+    half = 0.4
+    for sign in (1, -1):
+        q = (0.0, 0.0, sign * math.sin(half), sign * math.cos(half))
+        assert pose_from("goal", stamped(q=q))[2] == pytest.approx(0.8, abs=1e-15)
+
+
+def test_a_pose_with_covariance_is_a_pose(over_the_wire):
+    message = PoseWithCovarianceStamped()
+    message.pose.pose = pose_message((1.0, 2.0, 0.5))
+    assert pose_from("start", over_the_wire(message)) == pytest.approx((1.0, 2.0, 0.5), abs=1e-15)
+
+
+def test_height_small_tilt_and_three_decimals_are_taken():
+    assert pose_from("start", stamped(z=4.0)) == (1.0, 2.0, 0.0)
+    assert pose_from("start", stamped(q=(0.002, 0.0, 0.0, 1.0)))[2] == 0.0
+    assert pose_from("start", stamped(q=(0.0, 0.0, 0.707, 0.707)))[2] == pytest.approx(math.pi / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize(("message", "reason"), [
+    (stamped(x=NAN), "finite"),
+    (stamped(y=INF), "finite"),
+    (stamped(z=-INF), "finite"),
+    (stamped(q=(0.0, 0.0, 0.0, 0.0)), "norm is 0"),
+    (stamped(q=(0.0, 0.0, 0.0, 2.0)), "norm is 2"),
+    (stamped(q=(0.0, 0.0, 1.0, 1.0)), "norm is 1.41421"),
+    (stamped(q=(0.0, 0.0, 0.0, 1.01)), "norm is 1.01"),
+    (stamped(q=(0.0, 0.0, NAN, 1.0)), "norm is nan"),
+    (stamped(q=(0.0, 0.0, INF, 1.0)), "norm is inf"),
+    (stamped(q=(math.sin(0.05), 0.0, 0.0, math.cos(0.05))), "leans by 0.1 rad"),
+    (stamped(q=(0.0, 1.0, 0.0, 0.0)), "leans by 3.14 rad"),
+])
+def test_a_pose_that_is_none_is_refused_with_its_name_and_the_reason(message, reason):
+    with pytest.raises(InvalidPose, match=reason) as refusal:
+        pose_from("goal", message)
+    assert str(refusal.value).startswith("The goal pose ")
+
+
+def test_a_path_message_has_all_poses_in_the_frame(over_the_wire):
+    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.75], [2.0, -1.0, -3.0]])
+    message = over_the_wire(path_message(poses, "map", STAMP))
+    assert {(h.frame_id, h.stamp.sec, h.stamp.nanosec) for h in (message.header, *(p.header for p in message.poses))} \
+        == {("map", 12, 34)}
+    assert np.array([pose_from("any", pose) for pose in message.poses]) == pytest.approx(poses, abs=1e-15)
+
+
+@pytest.mark.parametrize("nothing", [(), np.empty((0, 3))])
+def test_no_path_is_an_empty_path_with_its_header(over_the_wire, nothing):
+    message = over_the_wire(path_message(nothing, "map", STAMP))
+    assert isinstance(message, PathMessage)
+    assert (message.header.frame_id, message.header.stamp, message.poses) == ("map", STAMP, [])
+
+
+@pytest.mark.parametrize("resolution", [0.05, 0.1, 0.3, 1.0, 0.025])
+def test_a_grid_survives_the_way_there_and_back(over_the_wire, resolution):
+    cells = np.array([[-1, 0, 100], [25, 65, 50]], dtype=np.int8)
+    grid = GridMap(cells, resolution, (-1.5, 2.0, 0.7))
+    back = grid_from(over_the_wire(grid_message(grid, "map", STAMP)), "map", 6)
+    assert (back.data == cells).all()
+    assert back.resolution == resolution
+    assert back.origin == pytest.approx(grid.origin, abs=1e-15)
+
+
+def test_a_grid_message_says_where_and_when(over_the_wire):
+    message = over_the_wire(grid_message(GridMap(np.zeros((2, 3), dtype=np.int8), 0.5), "world", STAMP))
+    assert (message.header.frame_id, message.header.stamp, message.info.map_load_time) == ("world", STAMP, STAMP)
+    assert (message.info.width, message.info.height, message.info.resolution) == (3, 2, 0.5)
+
+
+def test_a_map_is_the_same_by_file_and_by_topic(over_the_wire):
+    grid = GridMap(np.zeros((4, 4), dtype=np.int8), 0.05, (-1.0, -2.0, 0.0))
+    assert grid_from(over_the_wire(grid_message(grid, "map", STAMP)), "map", 16).id == grid.id
+
+
+def occupancy(width=2, height=2, resolution=0.1, values=4, frame="map", q=(0.0, 0.0, 0.0, 1.0), x=0.0):
+    message = OccupancyGrid(data=array.array("b", [0] * values))
+    message.header.frame_id = frame
+    message.info.width, message.info.height, message.info.resolution = width, height, resolution
+    message.info.origin = stamped(x=x, q=q).pose
+    return message
+
+
+@pytest.mark.parametrize(("message", "reason"), [
+    (occupancy(values=3), "has 3 values for 2 x 2 cells"),
+    (occupancy(values=5), "has 5 values for 2 x 2 cells"),
+    (occupancy(width=0, values=0), "has 0 values for 0 x 2 cells"),
+    (occupancy(width=0, height=0, values=0), "at least one"),
+    (occupancy(resolution=0.0), "resolution is 0.0"),
+    (occupancy(resolution=-0.5), "resolution is -0.5"),
+    (occupancy(resolution=NAN), "resolution is nan"),
+    (occupancy(x=NAN), "origin is"),
+    (occupancy(q=(0.0, 0.0, 0.0, 0.0)), "no rotation"),
+    (occupancy(q=(1.0, 0.0, 0.0, 0.0)), "leans"),
+    (occupancy(frame="odom"), "in frame 'odom', not in 'map'"),
+    (occupancy(width=4_000_000_000, height=4_000_000_000), "raise max_map_cells"),
+    (occupancy(width=3, height=2, values=6), r"more than max_map_cells \(4\)"),
+])
+def test_a_map_that_cannot_be_used_is_refused_with_the_reason(message, reason):
+    with pytest.raises(MapError, match=reason):
+        grid_from(message, "map", 4)
+
+
+def test_a_map_without_a_frame_is_in_the_global_one():
+    assert grid_from(occupancy(frame=""), "map", 4).data.shape == (2, 2)
+
+
+def test_a_grid_is_published_as_it_is():
+    grid = GridMap(np.zeros((1, 1), dtype=np.int8), 1.0)
+    assert as_grid(grid) is grid
+
+
+def test_a_polygon_map_is_published_as_a_fine_grid():
+    grid = as_grid(PolygonMap(shapely.box(0, 0, 2, 1)))
+    assert grid.resolution == 0.05
+    assert (grid.data == 0).sum() == 40 * 20
+
+
+def test_a_large_polygon_map_is_published_coarser():
+    coarse = as_grid(PolygonMap(shapely.box(0, 0, 1e5, 1e4)))
+    assert 0.9 * RASTER_CELLS < coarse.data.size < 1.1 * RASTER_CELLS
+
+
+KEYS = ["plan_id", "revision", "error_code", "error_name", "planner", "samples", "tree_nodes", "path_length",
+        "lower_bound", "gap", "time_to_first", "planning_time", "min_clearance", "max_curvature", "audit",
+        "seed", "map_id"]
+
+
+def values(message):
+    return {item.key: item.value for item in message.values}
+
+
+def test_the_status_of_a_path_has_all_its_figures(over_the_wire, plans):
+    plan = plans["solved"]
+    message = over_the_wire(status_message("/ns/planner", plan.status, plan.message, plan=plan, plan_id=7, revision=3,
+                                           map_id=plan.problem.map.id))
+    told = values(message)
+    assert (message.name, message.level, message.message) == ("/ns/planner: planner", DiagnosticStatus.OK, plan.message)
+    assert list(told) == KEYS
+    assert (told["plan_id"], told["revision"], told["error_code"], told["error_name"]) == ("7", "3", "0", "NONE")
+    assert (told["planner"], told["audit"], told["seed"]) == ("rrt_star", "ok", "1")
+    assert told["map_id"] == plan.problem.map.id
+    assert (int(told["samples"]), int(told["tree_nodes"])) == (plan.samples, len(plan.tree.poses))
+    for key, figure in {"path_length": plan.length, "lower_bound": plan.lower_bound, "gap": plan.gap,
+                        "time_to_first": plan.time_to_first, "planning_time": plan.planning_time,
+                        "min_clearance": plan.min_clearance, "max_curvature": plan.max_curvature}.items():
+        assert float(told[key]) == figure, key
+
+
+def test_the_status_of_a_failure_has_all_keys_and_is_an_error(over_the_wire, plans):
+    plan = plans["blocked"]
+    message = over_the_wire(status_message("/planner", plan.status, plan.message, plan=plan, plan_id=1, revision=1))
+    told = values(message)
+    assert message.level == DiagnosticStatus.ERROR
+    assert list(told) == KEYS
+    assert (told["error_code"], told["error_name"]) == ("206", "GOAL_OCCUPIED")
+    assert (told["path_length"], told["gap"]) == ("", "")
+
+
+@pytest.mark.parametrize(("status", "level"), [
+    (Status.NONE, DiagnosticStatus.OK), (Status.UNKNOWN, DiagnosticStatus.ERROR),
+    (Status.TF_ERROR, DiagnosticStatus.ERROR), (Status.TIMEOUT, DiagnosticStatus.ERROR),
+    (Status.NO_VALID_PATH, DiagnosticStatus.ERROR),
+    (Status.NO_MAP, DiagnosticStatus.STALE), (Status.NO_START, DiagnosticStatus.ERROR),
+    (Status.INVALID_POSE, DiagnosticStatus.ERROR), (Status.CANCELLED, DiagnosticStatus.WARN),
+])
+def test_the_level_follows_from_the_status(over_the_wire, status, level):
+    message = over_the_wire(status_message("/planner", status, "A sentence."))
+    assert message.level == level
+    assert list(values(message)) == KEYS
+    assert values(message)["error_name"] == status.name
+
+
+def test_an_approximate_or_cancelled_path_is_a_warning(plans):
+    from dataclasses import replace
+
+    plan = plans["solved"]
+    cancelled = replace(plan, cancelled=True)
+    approximate = replace(plan, path=replace(plan.path, end=(8.4, 5.0, 0.5)))
+    for doubtful in (cancelled, approximate):
+        assert status_message("/planner", Status.NONE, "", plan=doubtful).level == DiagnosticStatus.WARN
