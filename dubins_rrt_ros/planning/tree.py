@@ -66,7 +66,7 @@ class Tree:
         return Path(tuple(self.poses[0].tolist()), end, tuple(reversed(curves)))
 
     def segments(self, spacing: float) -> np.ndarray:
-        """(m, 2, 2) float64: ends, by x and y [m], of the straight pieces that draw all edges; turns in pieces of `spacing` [m]."""
+        """(m, 2, 2) float64: ends (x, y) [m] of the straight pieces that draw all edges; turns in pieces of `spacing` [m]."""
         turning = np.array([[turn != "S" for turn in word] for word in WORDS])[self.words]
         pieces = np.where(turning, np.ceil(self.lengths / spacing), self.lengths > 0).astype(np.int64).ravel()
         arc = np.repeat(np.arange(len(pieces)), pieces)
