@@ -37,6 +37,7 @@ class ClearanceField:
         is_grid = isinstance(map, GridMap)
         self.kernel, self._origin = _grid_parts(map, allow_unknown) if is_grid else _polygon_parts(map)
         self._polygons = None if is_grid else map.free
+        self._components: tuple[float, np.ndarray] | None = None
 
     @classmethod
     def of(cls, map: Map, allow_unknown: bool = False) -> "ClearanceField":
@@ -76,6 +77,15 @@ class ClearanceField:
     def possibly_free(self, need: float) -> np.ndarray:
         """(rows, columns) bool: a superset of the raster's cells that hold a point with a clearance of at least `need` [m]."""
         return self._may_be_free(np.asarray(self.kernel.field), need)
+
+    def components(self, need: float) -> np.ndarray:
+        """(rows, columns) int32: the connected components of the `possibly_free` cells, from 1 on, 0 elsewhere.
+
+        Kept for the last `need`, since the requests of one vehicle ask for the same.
+        """
+        if self._components is None or self._components[0] != need:
+            self._components = need, ndimage.label(self.possibly_free(need), structure=np.ones((3, 3)))[0]
+        return self._components[1]
 
     def _may_be_free(self, bounds: np.ndarray, need: float) -> np.ndarray:
         # The bound of a cell is at most two of its diagonals below the clearance of any point in it.

@@ -1,5 +1,6 @@
 """What plan() returns."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -94,4 +95,4 @@ class Progress:
     elapsed: float
     length: float | None
     improved: bool
-    snapshot: object
+    snapshot: Callable[[], Plan]
