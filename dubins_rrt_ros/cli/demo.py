@@ -6,15 +6,15 @@ import importlib.util
 import math
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-from dubins_rrt_ros.share import maps_directory, planner_command
+from dubins_rrt_ros.share import maps_directory
 
 from .output import check_drawing, check_folder
+from .planner_process import DemoError, PlannerProcess
 
 if TYPE_CHECKING:
     from .demo_client import Answer
@@ -22,44 +22,6 @@ if TYPE_CHECKING:
 START, GOAL = (1.5, 2.0, math.pi / 2), (13.5, 10.5, math.pi / 2)
 PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000,
               "planning_time": 2.0, "seed": 1}
-#: How long the node may take to stop [s].
-STOP_TIME = 10.0
-
-
-class DemoError(Exception):
-    """The demonstration failed; the message says where and what to do."""
-
-
-class PlannerProcess:
-    """The installed node in a process group of its own; what it logs is kept for the message of a failure."""
-
-    def __init__(self, log: IO[str]):
-        parameters = PARAMETERS | {"map_file": maps_directory() / "maze.yaml"}
-        assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
-        self._log = log
-        self._process = subprocess.Popen([*planner_command(), "--ros-args", *assignments], stdin=subprocess.DEVNULL,
-                                         stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
-
-    def check(self) -> None:
-        """Raise DemoError where the node has ended."""
-        status = self._process.poll()
-        if status is not None:
-            raise DemoError(f"the node ended with exit status {status}: {self._last_line()}")
-
-    def stop(self) -> int:
-        """End the node as Ctrl-C does, and return its exit status."""
-        if self._process.poll() is None:
-            os.killpg(self._process.pid, signal.SIGINT)
-            try:
-                self._process.wait(STOP_TIME)
-            except subprocess.TimeoutExpired:
-                os.killpg(self._process.pid, signal.SIGKILL)
-        return self._process.wait()
-
-    def _last_line(self) -> str:
-        self._log.seek(0)
-        lines = [line for line in self._log.read().splitlines() if line.strip()]
-        return lines[-1] if lines else "it said nothing"
 
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
@@ -109,7 +71,7 @@ def _planner() -> Iterator[PlannerProcess]:
     # SIGTERM ends this process as Ctrl-C does, so that it leaves no node behind.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        planner = PlannerProcess(log)
+        planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / "maze.yaml"}, log)
         try:
             yield planner
         finally:

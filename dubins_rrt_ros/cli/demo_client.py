@@ -19,7 +19,7 @@ from dubins_rrt_ros.node.conversions import grid_from, pose_from, pose_message
 from dubins_rrt_ros.planning import GridMap
 from dubins_rrt_ros.planning.problem import Pose
 
-from .demo import DemoError
+from .planner_process import DemoError
 
 FRAME = "map"
 #: How long anything expected may take to arrive [s].
