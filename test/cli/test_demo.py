@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli import demo
+from dubins_rrt_ros.cli import demo, planner_process
 from dubins_rrt_ros.cli.main import main
 
 
@@ -38,7 +38,7 @@ def test_the_demo_plans_over_real_topics_and_draws(tmp_path):
 def test_a_node_that_dies_is_told_in_one_line(tmp_path, monkeypatch, environment, capsys):
     pytest.importorskip("rclpy")
     dying = [sys.executable, "-c", "print('No engine.'); raise SystemExit(3)"]
-    monkeypatch.setattr(demo, "planner_command", lambda: dying)
+    monkeypatch.setattr(planner_process, "planner_command", lambda: dying)
     assert main(["demo", "--plot", str(tmp_path / "demo.png")]) == 1
     error = capsys.readouterr().err
     assert "exit status 3" in error and "No engine." in error and error.count("\n") == 1
@@ -57,7 +57,7 @@ def test_an_interrupted_demo_leaves_no_node_behind(tmp_path, monkeypatch, enviro
     pytest.importorskip("rclpy")
     program = (f"import os, signal; open({str(tmp_path / 'id')!r}, 'w').write(str(os.getpid())); "
                "os.kill(os.getppid(), signal.SIGTERM); signal.pause()")
-    monkeypatch.setattr(demo, "planner_command", lambda: [sys.executable, "-c", program])
+    monkeypatch.setattr(planner_process, "planner_command", lambda: [sys.executable, "-c", program])
     assert main(["demo", "--plot", str(tmp_path / "demo.png")]) == 130
     assert "interrupted" in capsys.readouterr().err
     with pytest.raises(ProcessLookupError):
