@@ -3,7 +3,7 @@
 import sys
 
 from dubins_rrt_ros import __version__
-from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError
+from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
 from dubins_rrt_ros.planning.plan_file import PlanFileError
 
 from . import demo, plan, render
@@ -22,8 +22,11 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return arguments.run(arguments)
     except InvalidPose as error:
-        return _refused(arguments.command, f"212 INVALID_POSE: {error}")
-    except (UsageError, OptionError, MapError, PlanFileError, OSError) as error:
+        print(f"{int(Status.INVALID_POSE)} {Status.INVALID_POSE.name}: {error}", file=sys.stderr)
+        return NO_PATH
+    except OSError as error:
+        return _refused(arguments.command, f"{error.filename or 'the output'} cannot be written: {error.strerror}")
+    except (UsageError, OptionError, MapError, PlanFileError) as error:
         return _refused(arguments.command, str(error))
     except KeyboardInterrupt:
         print(f"dubins_rrt {arguments.command}: interrupted", file=sys.stderr)
@@ -31,7 +34,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 a path, 1 no path, 2 wrong usage.",
+    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 a path, 1 no path, 2 wrong usage, 130 interrupted.",
                     description="Plans paths for a vehicle that drives forward and cannot turn on the spot.")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

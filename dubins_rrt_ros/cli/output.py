@@ -17,11 +17,13 @@ def check_folder(*files: str | None) -> None:
     """Refuse a file in a folder that does not exist; to be called before planning, so that no plan is lost for it.
 
     Raises:
-        UsageError: one of the files has no folder.
+        UsageError: one of the files has no folder, or is one.
     """
     for file in files:
         if file and file != STDOUT and not Path(file).parent.is_dir():
             raise UsageError(f"there is no folder {Path(file).parent} to write {Path(file).name} to; make it first")
+        if file and Path(file).is_dir():
+            raise UsageError(f"{file} is a folder; name a file to write to")
 
 
 def check_drawing(file: str | None) -> None:

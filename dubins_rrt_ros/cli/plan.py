@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     with _interrupt() as cancel, _progress_bar(request.settings.samples) as on_progress:
         answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
     answer = replace(answer, map_time=answer.map_time + request.load_time)
-    _write(answer, request.map_name, arguments)
     _report(answer, request, sys.stderr if arguments.json == STDOUT else sys.stdout)
+    _write(answer, request.map_name, arguments)
     return 0 if answer.path else 1
 
 

@@ -121,6 +121,7 @@ def _canvas(low: np.ndarray, high: np.ndarray, drawing: Drawing) -> tuple[Figure
     axes = figure.add_axes((LEFT / across, BOTTOM / up, width / across, height / up), facecolor=OBSTACLE)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.tick_params(labelsize=9)
+    axes.ticklabel_format(useOffset=False, style="plain")
     figure.text(LEFT / across, 1 - 0.16 / up, drawing.title, fontsize=13, weight="bold", va="top")
     figure.text(LEFT / across, 1 - 0.42 / up, "\n".join(lines), fontsize=10, color="#444444", va="top")
     return figure, axes

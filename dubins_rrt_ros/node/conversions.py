@@ -155,8 +155,10 @@ def _level(status: Status, plan: Plan | None) -> bytes:
         return DiagnosticStatus.WARN
     if status is not Status.NONE:
         return DiagnosticStatus.ERROR
-    approximate = plan is not None and plan.path is not None and plan.path.end != plan.problem.goal
-    return DiagnosticStatus.WARN if approximate or (plan is not None and plan.cancelled) else DiagnosticStatus.OK
+    if plan is None or plan.path is None:
+        return DiagnosticStatus.OK
+    approximate = not plan.problem.exact_goal and plan.path.end != plan.problem.goal
+    return DiagnosticStatus.WARN if approximate or plan.cancelled else DiagnosticStatus.OK
 
 
 def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:

@@ -76,6 +76,7 @@ class PlannerNode(Node):
         self._frame = self._options.global_frame
         self._map = None
         self._start: Pose | None = None
+        self._refused_map = self._refused_start = ""  # why the last one was refused
         self._plan_id = 0  # of the newest request; what bears another id is old and is not published
         self._revision = 0
         self._goal: PoseStamped | None = None  # waits for a start
@@ -128,15 +129,24 @@ class PlannerNode(Node):
             try:
                 self._map = grid_from(message, self._frame, self._options.max_map_cells)
             except MapError as error:
-                self.get_logger().error(f"A map was refused, the one before stays: {error}")
+                self._refused_map = f" The last one was refused: {error}."
+                self.get_logger().error(f"A map was refused: {error}")
+                if self._map is None:
+                    self._tell(Status.NO_MAP, self._no_map())
             else:
                 size = f"{message.info.width} x {message.info.height} cells"
                 self.get_logger().info(f"Took a map of {size}, id {self._map.id}")
 
     def _on_start(self, message: PoseStamped | PoseWithCovarianceStamped) -> None:
-        with self._telling_failures(self._tell):
+        with self._telling_failures(self._refuse_start):
             self._start = self._pose("start", message)
             self._plan()
+
+    def _refuse_start(self, status: Status, message: str) -> None:
+        """Forget the start before too: the vehicle is no longer there."""
+        self._start = None
+        self._refused_start = f" The last one was refused: {message}"
+        self._tell(status, message)
 
     def _on_goal(self, message: PoseStamped) -> None:
         self._plan_id += 1
@@ -176,7 +186,8 @@ class PlannerNode(Node):
             raise Refusal(Status.NO_MAP, self._no_map())
         if self._start is None:
             topics = " or ".join(map(self.resolve_topic_name, ("start_pose", "initialpose")))
-            raise Refusal(Status.NO_START, f"A goal came before any start: publish the vehicle's pose on {topics}.")
+            raise Refusal(Status.NO_START, "A goal came before any start: publish the vehicle's pose on "
+                                           f"{topics}.{self._refused_start}")
         goal = self._pose("goal", message)
         now = self._configured.read()
         return Request(self._plan_id, Problem(self._map, now.vehicle, self._start, goal, **now.problem), now.settings)
@@ -194,7 +205,8 @@ class PlannerNode(Node):
             raise Refusal(Status.INVALID_POSE, str(error)) from None
 
     def _no_map(self) -> str:
-        return f"There is no map yet, waiting for one on {self.resolve_topic_name('map')}: publish it or set map_file."
+        return (f"There is no map yet, waiting for one on {self.resolve_topic_name('map')}: publish it or set map_file."
+                f"{self._refused_map}")
 
     # What the worker has to say
 
@@ -262,11 +274,13 @@ class PlannerNode(Node):
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit status is 1 where its configuration cannot be used."""
     arguments = sys.argv if args is None else args
-    node = None
+    node = executor = None
     try:
         _show_help(arguments)
         node = _configured_node(arguments)
-        _spin(node)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        _spin(executor)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # SIGINT and SIGTERM are how it ends
     except ConfigurationError as error:
@@ -281,13 +295,13 @@ def main(args: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if node is not None:
             node.close()
+        if executor is not None:
+            executor.shutdown()  # left to the garbage collector, it may come after what it refers to, with a traceback
         rclpy.try_shutdown()
     return 0
 
 
-def _spin(node: PlannerNode) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
+def _spin(executor: SingleThreadedExecutor) -> None:
     # Not spin(): a signal can come between its look at the context and its wait, which then lasts for ever.
     while rclpy.ok():
         executor.spin_once(timeout_sec=SIGNAL_INTERVAL)

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import shapely
 
-from .map import GridMap, Map
+from .map import GridMap, Map, prepare_for_threads
 from .path import Path
 from .problem import Problem
 
@@ -22,8 +22,10 @@ TOLERANCE = 1e-6
 CONTACT = 1e-6
 #: A vehicle without extent is judged as a disc of this radius [m]: a point may cross a line that it keeps the distance 0 to.
 POINT = 1e-5
-#: The least clearance is found to within this [m].
-PRECISION = 1e-3
+#: The least clearance is found to within this [m], or to within this share of it.
+PRECISION, SHARE = 1e-3, 0.02
+#: With more pieces than this open the clearance counts as undecidable: the path grazes the obstacles all along.
+MOST_PIECES = 500_000
 #: About how many pieces a path is cut into at first.
 FIRST_PIECES = 64
 
@@ -36,7 +38,7 @@ class Audit:
 
     Attributes:
         findings: what is wrong with the path, one sentence each; none where it is right.
-        min_clearance: the least distance between path and obstacles, to within a millimetre [m].
+        min_clearance: the least distance between path and obstacles, to within a millimetre or 2 % [m].
         max_curvature: [1/m].
     """
 
@@ -58,7 +60,10 @@ def audit(path: Path, problem: Problem) -> Audit:
     findings = [*_end_findings(path, problem), *_joint_findings(path, starts, ends), *_turn_findings(path, problem)]
     obstacles = _obstacles_of(problem)
     need = max(problem.vehicle.robot_radius, POINT)
-    least, where = _least_clearance(arcs, obstacles, need)
+    least, where, decided = _least_clearance(arcs, obstacles, need)
+    if not decided:
+        findings.append(f"at ({where[0]:.3f}, {where[1]:.3f}) and elsewhere the clearance is so close to {need:g} m "
+                        "that it cannot be decided")
     if least < need - CONTACT:
         findings.append(f"at ({where[0]:.3f}, {where[1]:.3f}) the clearance is {least:.6f} m, "
                         f"less than the robot's radius, {problem.vehicle.robot_radius:g} m")
@@ -156,7 +161,7 @@ class _Obstacles:
 
     def __init__(self, inside: shapely.Geometry, solids: np.ndarray):
         self._inside = inside
-        shapely.prepare(inside)
+        prepare_for_threads(inside)
         lines = shapely.get_parts(shapely.get_rings(shapely.get_parts(inside)))
         corners = [shapely.get_coordinates(line) for line in lines]
         edges = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in corners])
@@ -201,8 +206,8 @@ def _rectangles(grid: GridMap, left, low, right, high) -> np.ndarray:
     return shapely.polygons(np.stack([turned.real, turned.imag], axis=-1))
 
 
-def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[float, tuple[float, float]]:
-    """The least clearance and where it is; pieces are halved until none can hide contact or a clearance much less."""
+def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[float, tuple[float, float], bool]:
+    """The least clearance, where it is, and whether no piece can hide contact: they are halved until that is so."""
     longest = max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION)
     pieces = np.maximum(np.ceil(arcs.length / longest), 1).astype(int)
     index = np.repeat(np.arange(len(pieces)), pieces)
@@ -221,13 +226,13 @@ def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[f
 
     least, where = math.inf, (math.nan, math.nan)
     at_begin, at_end = clearance(begin), clearance(begin + size)
-    while len(index) and least >= need - CONTACT:
+    while 0 < len(index) <= MOST_PIECES and least >= need - CONTACT:
         bound = (at_begin + at_end - size) / 2
-        open_ = (bound < need - 2 * CONTACT) | (bound < least - PRECISION)
+        open_ = (bound < need - 2 * CONTACT) | (bound < least - max(PRECISION, SHARE * least))
         index, begin, size, at_begin, at_end = (a[open_] for a in (index, begin, size / 2, at_begin, at_end))
         if len(index):
             at_middle = clearance(begin + size)
             begin = np.concatenate([begin, begin + size])
             at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
             index, size = np.tile(index, 2), np.tile(size, 2)
-    return least, where
+    return least, where, len(index) <= MOST_PIECES

@@ -10,11 +10,16 @@ from .problem import Problem
 
 
 def lower_bound(problem: Problem) -> float:
-    """A length that no path of the problem falls below [m]: the Dubins curve without obstacles, or the straight line to
-    where the goal's tolerance begins."""
+    """A length that no path of the problem falls below [m].
+
+    It is that of the Dubins curve without obstacles; or, where the goal has a tolerance, the straight line to where that
+    begins and the turn to the first heading that will do.
+    """
+    start, goal, radius = problem.start, problem.goal, problem.vehicle.turning_radius
     if problem.exact_goal:
-        return dubins.shortest(problem.start, problem.goal, problem.vehicle.turning_radius).length
-    return max(0.0, math.dist(problem.start[:2], problem.goal[:2]) - problem.goal_tolerance_xy)
+        return dubins.shortest(start, goal, radius).length
+    turn = abs(math.remainder(goal[2] - start[2], math.tau)) - problem.yaw_tolerance
+    return max(0.0, math.dist(start[:2], goal[:2]) - problem.goal_tolerance_xy, radius * turn)
 
 
 def are_separated(problem: Problem, field: ClearanceField) -> bool:

@@ -58,6 +58,9 @@ class ClearanceField:
 
     def curve_is_free(self, curve: DubinsCurve, need: float) -> bool:
         """Whether the clearance along a curve is nowhere below `need` [m]."""
+        # The kernel's distance to polygons has no sign: what starts in free space stays there.
+        if not self.at(np.array(curve.start[:2])) > 0:
+            return False
         return self.kernel.is_curve_free(*curve.start, curve.radius, WORDS.index(curve.word), *curve.lengths, need)
 
     def cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,9 +86,10 @@ class ClearanceField:
 
         Kept for the last `need`, since the requests of one vehicle ask for the same.
         """
-        if self._components is None or self._components[0] != need:
-            self._components = need, ndimage.label(self.possibly_free(need), structure=np.ones((3, 3)))[0]
-        return self._components[1]
+        kept = self._components
+        if kept is None or kept[0] != need:
+            self._components = kept = need, ndimage.label(self.possibly_free(need), structure=np.ones((3, 3)))[0]
+        return kept[1]
 
     def _may_be_free(self, bounds: np.ndarray, need: float) -> np.ndarray:
         # The bound of a cell is at most two of its diagonals below the clearance of any point in it.

@@ -14,6 +14,10 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 FREE_UP_TO, OCCUPIED_FROM = 25, 65
 
 
+#: The smallest cells and the largest coordinates [m] that leave rounding far below what the planner guarantees.
+FINEST, FARTHEST = 1e-4, 1e8
+
+
 class MapError(ValueError):
     """A map that cannot be used; the message names what is wrong and the remedy."""
 
@@ -46,6 +50,10 @@ class GridMap:
             raise MapError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
         if not all(map(math.isfinite, self.origin)):
             raise MapError(f"{self.name}: origin is {self.origin}; its x, y and yaw must be finite")
+        if self.resolution < FINEST or max(map(abs, (*self.origin[:2], *(n * self.resolution for n in data.shape)))) > FARTHEST:
+            raise MapError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them from "
+                           f"({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, cells of "
+                           f"{FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
         data.setflags(write=False)
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "resolution", float(self.resolution))
@@ -115,7 +123,7 @@ class PolygonMap:
                            "mend its rings")
         if not np.isfinite(shapely.bounds(self.free)).all():
             raise MapError(f"{self.name}: a coordinate is not finite; give finite metres")
-        shapely.prepare(self.free)
+        prepare_for_threads(self.free)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the bounding rectangle, counter-clockwise [m]."""
@@ -129,6 +137,16 @@ class PolygonMap:
 
 
 Map = GridMap | PolygonMap
+
+
+def prepare_for_threads(polygons: shapely.Geometry) -> None:
+    """Prepare polygons for fast tests of points, in several threads.
+
+    What shapely prepares is built with the first two tests, which must not happen in two threads at once.
+    """
+    shapely.prepare(polygons)
+    x0, y0, x1, y1 = shapely.bounds(polygons)
+    shapely.contains_xy(polygons, [x0, x1, (x0 + x1) / 2], [y0, y1, (y0 + y1) / 2])
 
 
 def _digest(*parts: bytes) -> str:

@@ -36,8 +36,9 @@ class Option(NamedTuple):
             return "true or false"
         if self.type is str:
             return "text"
-        kind = "an integer" if self.type is int else "a number"
-        return f"{kind} from {self.low:g} to {self.high:g}"
+        if self.type is int:
+            return f"an integer from {self.low} to {self.high}"
+        return f"a number from {self.low:g} to {self.high:g}"
 
     def convert(self, value: Any) -> Any:
         """`value` as the option's type, an int where a float is due included.

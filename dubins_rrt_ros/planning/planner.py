@@ -20,6 +20,8 @@ from .tree import Tree
 
 #: Progress is reported at least this often [s].
 REPORT_INTERVAL = 0.05
+#: Poses this close are the same [m, rad]: what lies between them is rounding, of quaternions and the like.
+SAME = 1e-9
 #: A path shorter by less than this is no improvement [m].
 LEAST_IMPROVEMENT = 1e-6
 
@@ -41,6 +43,7 @@ def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = l
     """
     started = time.perf_counter()
     field = ClearanceField.of(problem.map, problem.allow_unknown)
+    field.components(problem.vehicle.robot_radius)  # once per map and vehicle: not the request's time
     request = _Request(problem, _with_seed(settings), field, map_time=time.perf_counter() - started)
     return request.refusal() or request.search(cancel, on_progress)
 
@@ -105,8 +108,8 @@ class _Request:
 
     def _start_reaches_goal(self) -> bool:
         start, goal = self._problem.start, self._problem.goal
-        return (math.dist(start[:2], goal[:2]) <= self._problem.goal_tolerance_xy
-                and abs(math.remainder(start[2] - goal[2], math.tau)) <= self._problem.yaw_tolerance)
+        return (math.dist(start[:2], goal[:2]) <= self._problem.goal_tolerance_xy + SAME
+                and abs(math.remainder(start[2] - goal[2], math.tau)) <= self._problem.yaw_tolerance + SAME)
 
     def _answer(self, search: Search, cancelled: bool) -> Plan:
         """The plan as the search stands."""
@@ -119,7 +122,7 @@ class _Request:
         if not search.done:
             message = f"No path within planning_time {self._settings.planning_time:g} s: {drawn}; allow more time."
             return self._plan(Status.TIMEOUT, message, tree, samples=search.samples)
-        message = f"No path found: {drawn}; allow more samples, or loosen the goal's tolerance."
+        message = f"No path found: {drawn}; {_advice(self._problem, tree)}."
         return self._plan(Status.NO_VALID_PATH, message, tree, samples=search.samples)
 
     def _audited(self, path: Path, tree: Tree, samples: int, cancelled: bool) -> Plan:
@@ -137,10 +140,22 @@ class _Request:
                     planning_time=self._elapsed, map_time=self._map_time, lower_bound=self._bound, **more)
 
 
+def _advice(problem: Problem, tree: Tree) -> str:
+    """What may help where the samples are spent."""
+    if math.dist(problem.start[:2], problem.goal[:2]) < problem.vehicle.turning_radius / 10:
+        return ("the goal is so close to the start that a vehicle that cannot turn on the spot has to drive a full loop to it; "
+                "set goal_tolerance_xy and goal_tolerance_yaw if it is close enough")
+    if len(tree) == 1:
+        return (f"no curve of the turning radius {problem.vehicle.turning_radius:g} m left the start; see whether an obstacle "
+                "is ahead of it, set step_size, or allow more samples")
+    return "allow more samples, or loosen the goal's tolerance"
+
+
 def _success_message(plan: Plan) -> str:
     """What was found, in a sentence."""
     end = "cancelled after " if plan.cancelled else "after "
-    message = (f"Path of {plan.length:.2f} m, at most {100 * plan.gap:.1f} % above the shortest possible, "
+    above = f", at most {100 * plan.gap:.1f} % above the shortest possible" if math.isfinite(plan.gap) else ""
+    message = (f"Path of {plan.length:.2f} m{above}, "
                f"{end}{plan.samples} samples in {plan.planning_time:.3g} s")
     if plan.problem.exact_goal:
         return message + "."
@@ -159,7 +174,7 @@ def _is_outside(problem: Problem, pose) -> bool:
 def _outside_message(problem: Problem, name: str, pose) -> str:
     corners = problem.map.corners()
     low, high = corners.min(axis=0), corners.max(axis=0)
-    return (f"{name} ({pose[0]:.2f}, {pose[1]:.2f}) is outside the map, which spans x {low[0]:.2f} to {high[0]:.2f} m "
+    return (f"{name} ({pose[0]:.6g}, {pose[1]:.6g}) is outside the map, which spans x {low[0]:.2f} to {high[0]:.2f} m "
             f"and y {low[1]:.2f} to {high[1]:.2f} m; check the pose and its frame.")
 
 

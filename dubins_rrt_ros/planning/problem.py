@@ -11,6 +11,10 @@ from .vehicle import Vehicle
 Pose = tuple[float, float, float]
 
 
+#: A yaw beyond this has lost too many digits of its direction to rounding [rad].
+LARGEST_YAW = 1e6
+
+
 class InvalidPose(ValueError):
     """A pose that is none; the message says which and why."""
 
@@ -60,7 +64,7 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
     """`pose` as three floats.
 
     Raises:
-        InvalidPose: it has not three finite numbers; `name` is in the message.
+        InvalidPose: it has not three finite numbers, or too large a yaw; `name` is in the message.
     """
     try:
         numbers = tuple(map(float, pose))
@@ -68,4 +72,7 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
         numbers = ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise InvalidPose(f"The {name} pose is {pose}; give three finite numbers: x [m], y [m], yaw [rad].")
+    if abs(numbers[2]) > LARGEST_YAW:
+        raise InvalidPose(f"The {name} pose has the yaw {numbers[2]:g} rad; give one within {LARGEST_YAW:g} rad of 0, "
+                          "where rounding leaves its direction exact.")
     return numbers

@@ -1,5 +1,6 @@
 """What plan() returns."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -72,10 +73,12 @@ class Plan:
 
     @property
     def gap(self) -> float | None:
-        """length / lower_bound - 1, 0 where both are 0, or None without a path."""
+        """length / lower_bound - 1, 0 for a path of length 0, infinite where the bound says nothing, None without a path."""
         if self.path is None:
             return None
-        return self.length / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
+        if self.lower_bound == 0:
+            return math.inf if self.length > 0 else 0.0
+        return self.length / self.lower_bound - 1
 
 
 @dataclass(frozen=True)

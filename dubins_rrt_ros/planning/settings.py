@@ -18,7 +18,7 @@ class Settings:
     samples: int = option(3000, "how many samples are drawn at most", low=1, high=10_000_000)
     planning_time: float = option(1.0, "the time limit", unit="s", low=0.001, high=3600.0)
     goal_bias: float = option(0.05, "the share of samples drawn at the goal", low=0.0, high=1.0)
-    step_size: float = option(0.0, "the longest new edge; 0 is unlimited", unit="m", low=0.0, high=1e6)
+    step_size: float = option(0.0, "the longest edge, rewired ones too; 0 is unlimited", unit="m", low=0.0, high=1e6)
     heading_sampling: str = option("uniform", "headings of the samples: uniform in [0, 2 pi), or goal, towards the goal",
                                    choices=("uniform", "goal"))
     path_spacing: float = option(0.05, "the largest distance between two poses of a published path", unit="m",

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from .options import OptionError, convert_options, option
+from .options import OptionError, convert_options, option, options
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class Vehicle:
         convert_options(self)
         if (self.wheelbase > 0) != (self.max_steering_angle > 0):
             raise OptionError(f"wheelbase is {self.wheelbase:g} m and max_steering_angle {self.max_steering_angle:g} rad; "
-                              "set both, or neither and turning_radius")
+                              "set both at once, or neither and turning_radius")
         if self.wheelbase > 0:
-            object.__setattr__(self, "turning_radius", self.wheelbase / math.tan(self.max_steering_angle))
+            derived = next(item for item in options(Vehicle) if item.name == "turning_radius")
+            object.__setattr__(self, "turning_radius", derived.convert(self.wheelbase / math.tan(self.max_steering_angle)))

@@ -108,10 +108,17 @@ def test_every_option_is_a_flag(hall, capsys):
     (["--turning-radius", "-1"], "turning_radius is -1"), (["--turning-radius", "wide"], "--turning-radius"),
     (["--samples", "0"], "samples is 0"), (["--planner", "a_star"], "--planner"),
     (["--wheelbase", "1"], "max_steering_angle"), (["--start", "1", "2"], "--start"),
-    (["--start", "1", "2", "nan"], "INVALID_POSE"), (["--start", "-inf", "2", "0"], "-inf"),
+    (["--json", "."], "is a folder"),
     (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.gif"], "p.gif"), (["--sampels", "3"], "--sampels")])
 def test_wrong_usage_takes_one_line(hall, flags, names, capsys):
     assert names in refusal(hall, *REQUEST, *flags, capsys=capsys)
+
+
+@pytest.mark.parametrize("start", [("1", "2", "nan"), ("-inf", "2", "0"), ("1", "2", "1e9")])
+def test_a_pose_that_is_none_has_no_path(hall, start, capsys):
+    status, out, err = run(hall, *REQUEST, "--start", *start, capsys=capsys)
+    assert (status, out) == (1, "")
+    assert err.startswith("212 INVALID_POSE: The start pose ") and err.count("\n") == 1
 
 
 def test_a_missing_or_broken_map_takes_one_line(hall, capsys):

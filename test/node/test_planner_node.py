@@ -160,8 +160,13 @@ def test_a_pose_that_cannot_be_used_is_refused_and_the_node_goes_on(asked, topic
     told = client.status_of(plan_id, error_code=code, error_name=name)
     assert told["level"] == DiagnosticStatus.ERROR
     assert all(word in told["message"] for word in words)
+    if topic != "goal_pose":  # the vehicle is no longer where the start before said
+        client.send("goal_pose", BEHIND)
+        told = client.status_of(2, error_name="NO_START")
+        assert all(word in told["message"] for word in words)
+        client.send("start_pose", START)
     client.send("goal_pose", BEHIND)
-    client.status_of(3 if topic == "goal_pose" else 2, error_name="NONE")
+    client.status_of(3, error_name="NONE")
 
 
 def test_a_pose_without_a_frame_is_in_the_global_frame(asked):
@@ -203,6 +208,15 @@ def test_a_map_that_came_before_the_node_is_taken(planners):
     second = planners.restart(**QUICK)
     client.follow(second)
     client.wait_for(lambda: "Took a map" in second.output, "the latched map to be taken")
+
+
+def test_a_bad_first_map_is_told_in_the_status(planners):
+    planners.start(**QUICK)
+    client = planners.client()
+    client.publish_map(occupancy(width=7))
+    told = client.wait_for(lambda: next((s for s in client.statuses if "7 x 100" in s.message), None), "the refusal")
+    assert told.level == DiagnosticStatus.STALE
+    assert "no map yet" in told.message
 
 
 def test_a_bad_map_is_refused_and_the_one_before_stays(planners):

@@ -115,8 +115,8 @@ def test_the_first_path_is_reported_at_once_and_later_ones_when_the_interval_is_
     call = planning.calls.get(timeout=SOON)
     call.on_progress(progress(improved=False))
     assert reports.empty()
-    call.on_progress(progress(improved=True))
     first = time.monotonic()
+    call.on_progress(progress(improved=True))
     assert not reports.get(timeout=SOON).last
     call.on_progress(progress(improved=True))
     assert reports.empty()

@@ -288,3 +288,12 @@ def test_lengths_of_read_only_arrays():
     ends = np.array([[1.0, 2, 3], [4, 5, 6]])
     ends.setflags(write=False)
     assert lengths(ends, ends[::-1].copy(), 1.0).shape == (2,)
+
+
+def test_an_arc_is_no_full_circle_longer():
+    """Where the circles of both ends coincide, the direction between their centres is nothing but rounding."""
+    rng = np.random.default_rng(5)
+    for start, turn, length in zip(rng.uniform((-10, -10, -3), (10, 10, 3), (2000, 3)), rng.integers(0, 2, 2000),
+                                   rng.uniform(1e-6, 6.0, 2000), strict=True):
+        arc = DubinsCurve(tuple(start), 1.0, ("LSL", "RSR")[turn], (length, 0.0, 0.0))
+        assert shortest(arc.start, arc.end, 1.0).length <= length + 1e-9

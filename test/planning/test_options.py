@@ -24,7 +24,7 @@ MAKE = {Settings: Settings, Vehicle: Vehicle,
 OPTIONS = [(cls, item) for cls in MAKE for item in options(cls)]
 of_type = {kind: [(cls, item) for cls, item in OPTIONS if item.type is kind] for kind in (float, int, bool, str)}
 #: Wheelbase and steering angle go together only.
-PAIR = {"wheelbase": {"max_steering_angle": 0.5}, "max_steering_angle": {"wheelbase": 1.0}}
+PAIR = {"wheelbase": {"max_steering_angle": 0.5}, "max_steering_angle": {"wheelbase": 10.0}}
 
 
 def names(kind):
@@ -123,7 +123,7 @@ def test_turning_radius_of_a_wheelbase():
 
 @pytest.mark.parametrize("half", [{"wheelbase": 2.7}, {"max_steering_angle": 0.6}])
 def test_wheelbase_and_steering_angle_go_together(half):
-    with pytest.raises(OptionError, match=r"wheelbase is .* and max_steering_angle .*; set both, or neither"):
+    with pytest.raises(OptionError, match=r"wheelbase is .* and max_steering_angle .*; set both at once, or neither"):
         Vehicle(**half)
 
 

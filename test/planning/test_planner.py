@@ -174,9 +174,25 @@ def test_same_seed_same_bytes(planner, maze):
         assert getattr(one.tree, name).tobytes() == getattr(other.tree, name).tobytes()
 
 
+@pytest.mark.parametrize("goal", [(1.0, 2.0, 2.9999999999999996), (math.nextafter(1.0, 0), 2.0, 3.0), (1.0, 2.0, 3.0 - math.tau)])
+def test_poses_that_differ_by_rounding_are_the_same(planner, goal):
+    result = plan(Problem(empty_map(), VEHICLE, (1.0, 2.0, 3.0), goal), settings(planner))
+    assert (result.status, result.samples, result.length) == (Status.NONE, 0, 0.0)
+    assert result.path.poses(0.1).tolist() == [[1.0, 2.0, 3.0]]
+
+
+def test_a_boxed_in_start_is_told(planner):
+    data = np.zeros((40, 40))
+    data[:, 22] = 100
+    problem = Problem(GridMap(data, 0.5), Vehicle(1.0, 0.3), (10.55, 10.0, 0.0), (3.0, 3.0, 0.0))
+    result = plan(problem, settings(planner, samples=50))
+    assert result.status == Status.NO_VALID_PATH
+    assert "left the start" in result.message
+
+
 @pytest.mark.parametrize("pose", [(-10.5, 0, 0), (0, 10.01, 0), (1e9, 0, 0)])
 def test_outside_the_map(planner, pose):
-    words = (f"({pose[0]:.2f}, {pose[1]:.2f})", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the pose")
+    words = (f"({pose[0]:g}, {pose[1]:g})", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the pose")
     result = plan(Problem(empty_map(), VEHICLE, pose, GOAL), settings(planner))
     assert_refused(result, Status.START_OUTSIDE_MAP, "Start", *words)
     result = plan(Problem(empty_map(), VEHICLE, START, pose), settings(planner))

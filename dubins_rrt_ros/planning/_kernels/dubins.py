@@ -191,6 +191,9 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         t = mod_two_pi(s * (atan2(v, u) - theta0) + p / 2)
         q = mod_two_pi(turned - t + p)
     elif s == last:
+        least = FIT * (1 + fabs(x) + fabs(y))
+        if squared <= least * least and turned < limit and fits(word, turned, 0, 0, x, y, theta0, theta1):
+            return turned, 0, 0  # both poses on one circle, where the direction of (u, v) is but rounding
         if turned >= limit or squared >= (limit - turned) * (limit - turned):
             return 0, NO_CURVE, 0
         p = sqrt(squared)

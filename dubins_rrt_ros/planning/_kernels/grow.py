@@ -48,6 +48,7 @@ class Grower:
     goal_theta: cython.double
     tolerance_xy: cython.double
     tolerance_yaw: cython.double
+    closest: NearSet
     to: NearSet
     onward: GainSet
     goal_nodes: cython.int[::1]
@@ -68,6 +69,7 @@ class Grower:
         self.longest = step * (1 + ROUNDING) if step > 0 else NO_WAY
         self.goal_x, self.goal_y, self.goal_theta = goal
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
+        self.closest = NearSet(tree, 1)
         self.to = NearSet(tree, most_near)
         self.onward = GainSet(tree, most_near)
         self.goal_nodes = np.empty(0, np.int32)
@@ -121,26 +123,33 @@ class Grower:
         if self.step == 0 and not self.clearance.free(x, y, self.need):
             return
         x, y, theta, word, first, second, third = self.steer(x, y, theta)
-        if first + second + third == 0:
+        if self.closest.count == 0 or first + second + third == 0:
             return
-        if self.edge_is_free(self.to.nodes[0], word, first, second, third):
-            self.add(x, y, theta, self.to.nodes[0], word, first, second, third)
+        if self.edge_is_free(self.closest.nodes[0], word, first, second, third):
+            self.add(x, y, theta, self.closest.nodes[0], word, first, second, third)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def extend_and_rewire(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
         """One round of Algorithm 2: steer, choose the parent among the near nodes, add, rewire the near nodes through it."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
+        word: cython.int = 0
+        first: cython.double = 0
+        second: cython.double = 0
+        third: cython.double = 0
         if self.step > 0:
             x, y, theta, word, first, second, third = self.steer(x, y, theta)
+            if self.closest.count == 0:
+                return
         if not self.clearance.free(x, y, self.need):
             return
         near: cython.int = cython.cast(cython.int, ceil(self.near_factor * log(self.tree.size + 1)))
         self.to.collect_nearest(x, y, theta, near, self.longest)
+        if self.step > 0 and (self.to.count == 0 or self.to.keys[self.to.count - 1] > first + second + third):
+            # The edge as it was steered: solved anew, rounding of the pose can make it longer by a full circle.
+            self.to.insert(self.closest.nodes[0], word, first, second, third)
+        if self.to.count == 0:
+            return
         node: cython.int
         if self.to.keys[0] == 0:
             # The goal is drawn again and again; once it is in the tree, that is another try to reach it from elsewhere.
@@ -158,13 +167,13 @@ class Grower:
     def steer(self, x: cython.double, y: cython.double, theta: cython.double
               ) -> tuple[cython.double, cython.double, cython.double, cython.int, cython.double, cython.double, cython.double]:
         """The pose, and the edge to it, that lies from the closest node towards the sample, at most a step away."""
-        self.to.collect_nearest(x, y, theta, 1, NO_WAY)
-        node: cython.int = self.to.nodes[0]
-        word: cython.int = self.to.words[0]
-        first: cython.double = self.to.lengths[0, 0]
-        second: cython.double = self.to.lengths[0, 1]
-        third: cython.double = self.to.lengths[0, 2]
-        if self.step == 0 or first + second + third <= self.step:
+        self.closest.collect_nearest(x, y, theta, 1, NO_WAY)
+        node: cython.int = self.closest.nodes[0]
+        word: cython.int = self.closest.words[0]
+        first: cython.double = self.closest.lengths[0, 0]
+        second: cython.double = self.closest.lengths[0, 1]
+        third: cython.double = self.closest.lengths[0, 2]
+        if self.closest.count == 0 or self.step == 0 or first + second + third <= self.step:
             return x, y, theta, word, first, second, third
         first = min(first, self.step)
         second = min(second, self.step - first)
