@@ -227,14 +227,14 @@ def test_a_bad_map_is_refused_and_the_one_before_stays(planners):
     client.publish_map(occupancy(width=7))
     client.wait_for(lambda: "has 10000 values for 7 x 100 cells" in process.output, "the map to be refused")
     ask(client, START, GOAL)
-    client.status_of(1, error_name="NONE")
+    assert client.status_of(1, error_name="NONE")["map_id"]
 
 
 def test_a_volatile_map_is_taken_where_the_parameter_says_so(planners):
     process = planners.start(map_transient_local=False)
     client = planners.client()
     client.publish_map(occupancy(), QoSProfile(depth=1, durability=DurabilityPolicy.VOLATILE))
-    client.wait_for(lambda: "Took a map" in process.output, "the map to be taken")
+    assert client.wait_for(lambda: "Took a map of 100 x 100" in process.output, "the map to be taken")
 
 
 def test_the_map_file_is_published(asked):
@@ -270,7 +270,7 @@ def test_a_goal_that_is_refused_replaces_the_old_one_too(asked):
     client.send("goal_pose", OCCUPIED)
     client.status_of(2, error_code="206")
     client.send("goal_pose", invalid(x=math.nan))
-    client.status_of(3, error_code="212")
+    assert client.status_of(3, error_code="212")["level"] == DiagnosticStatus.ERROR
     client.wait_for(lambda: client.paths and not client.paths[-1].poses, "an empty path")
 
 
