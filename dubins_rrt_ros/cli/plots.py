@@ -178,6 +178,12 @@ def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead:
     """A name at a distance ahead of a pose, or behind it, and clear of it."""
     x, y, theta = pose
     dx, dy = ahead * math.cos(theta), ahead * math.sin(theta)
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    if not (left < x + 2.5 * dx < right and low < y + 2.5 * dy < high):
+        # It would run over the frame: beside the pose, then, on the side of the map's middle.
+        dx, dy = -dy, dx
+        if dx * (left + right - 2 * x) + dy * (low + high - 2 * y) < 0:
+            dx, dy = -dx, -dy
     aside = {-1: "right", 0: "center", 1: "left"}[round(dx / abs(ahead))]
     above = {-1: "top", 0: "center", 1: "bottom"}[round(dy / abs(ahead))]
     halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
