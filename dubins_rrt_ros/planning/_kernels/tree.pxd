@@ -15,7 +15,6 @@ cdef class SearchTree:
     cdef double x0
     cdef double y0
     cdef double bucket_size
-    cdef double slack
     cdef int add(self, double x, double y, double theta, int parent, int word,
                  double first, double second, double third) noexcept nogil
     cdef void reparent(self, int node, int parent, int word, double first, double second, double third) noexcept nogil

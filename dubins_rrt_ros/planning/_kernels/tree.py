@@ -5,12 +5,9 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import slack_of
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
-
-    from .dubins import slack_of
 
 
 #: About how many buckets there are. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
@@ -41,7 +38,6 @@ class SearchTree:
         self.radius = radius
         self.x0, self.y0 = corner
         width, height = extent
-        self.slack = slack_of(self.x0, self.y0, self.x0 + width, self.y0 + height)
         self.bucket_size = sqrt(width * height / BUCKETS)
         shape = (int(height / self.bucket_size) + 1, int(width / self.bucket_size) + 1)
         self.buckets = np.full(shape, -1, dtype=np.int32)
