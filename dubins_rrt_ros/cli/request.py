@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import Map, Problem, Settings, load_map
+from dubins_rrt_ros.planning import Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.path import Path as DrivenPath
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 from dubins_rrt_ros.share import find_map, maps_directory
@@ -82,5 +82,12 @@ def _same_map(file: str, document: dict[str, Any], max_map_cells: int) -> tuple[
 def _candidates(file: str, name: str) -> Iterator[Path]:
     """Where the map of a document may be: as it was named then, beside the document, among the installed maps."""
     base, beside, own = Path(name).name, Path(file).parent, maps_directory()
-    places = (Path(name), beside / name, beside / base, own / base, own / f"{base}.yaml")
+    places = (*_named(name), beside / name, beside / base, own / base, own / f"{base}.yaml")
     return (place for place in dict.fromkeys(places) if place.is_file())
+
+
+def _named(name: str) -> list[Path]:
+    try:
+        return [find_map(name)]
+    except MapNotFound:
+        return []

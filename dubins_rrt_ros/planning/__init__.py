@@ -7,7 +7,7 @@ from ._kernels import COMPILED as kernels_compiled
 from .audit import Audit, audit
 from .clearance import ClearanceField
 from .dubins import WORDS, DubinsCurve
-from .map import FREE, OCCUPIED, UNKNOWN, GridMap, Map, MapError, PolygonMap, rasterise
+from .map import FREE, OCCUPIED, UNKNOWN, GridMap, Map, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
 from .map_files import load_map, save_map
 from .options import OptionError, options, values
 from .path import Path
@@ -19,7 +19,8 @@ from .tree import Tree, TreeError
 from .vehicle import Vehicle
 
 __all__ = [
-    "FREE", "OCCUPIED", "UNKNOWN", "WORDS", "Audit", "ClearanceField", "DubinsCurve", "GridMap", "InvalidPose", "Map", "MapError",
-    "OptionError", "Path", "Plan", "PolygonMap", "Pose", "Problem", "Progress", "Settings", "Status", "Tree", "TreeError",
-    "Vehicle", "audit", "checked_pose", "kernels_compiled", "load_map", "options", "plan", "rasterise", "save_map", "values",
+    "FREE", "OCCUPIED", "UNKNOWN", "WORDS", "Audit", "ClearanceField", "DubinsCurve", "GridMap", "InvalidPose", "Map",
+    "MapError", "MapMetadataError", "MapNotFound", "OptionError", "Path", "Plan", "PolygonMap", "Pose", "Problem", "Progress",
+    "Settings", "Status", "Tree", "TreeError", "Vehicle", "audit", "checked_pose", "kernels_compiled", "load_map", "options",
+    "plan", "rasterise", "save_map", "values",
 ]

@@ -19,7 +19,19 @@ FINEST, FARTHEST = 1e-4, 1e8
 
 
 class MapError(ValueError):
-    """A map that cannot be used; the message names what is wrong and the remedy."""
+    """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
+
+    def __init__(self, message: str):
+        line = " ".join(message.split())
+        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line))
+
+
+class MapNotFound(MapError):
+    """A map file, or the image that it names, that is not there or cannot be opened as a file."""
+
+
+class MapMetadataError(MapError):
+    """What describes a grid, and not its cells, that cannot be used: its YAML, its resolution, its origin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +59,13 @@ class GridMap:
             raise MapError(f"{self.name}: cells hold values from {data.min()} to {data.max()}; give -1 (unknown), or 0 to 100")
         data = data.astype(np.int8, copy=False)
         if not (math.isfinite(self.resolution) and self.resolution > 0):
-            raise MapError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
+            raise MapMetadataError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
         if not all(map(math.isfinite, self.origin)):
-            raise MapError(f"{self.name}: origin is {self.origin}; its x, y and yaw must be finite")
+            raise MapMetadataError(f"{self.name}: origin is {self.origin}; its x, y and yaw must be finite")
         if self.resolution < FINEST or max(map(abs, (*self.origin[:2], *(n * self.resolution for n in data.shape)))) > FARTHEST:
-            raise MapError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them from "
-                           f"({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, cells of "
-                           f"{FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
+            raise MapMetadataError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them "
+                                   f"from ({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, "
+                                   f"cells of {FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
         data.setflags(write=False)
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "resolution", float(self.resolution))

@@ -18,6 +18,8 @@ from dubins_rrt_ros.planning.map import (
     UNKNOWN,
     GridMap,
     MapError,
+    MapMetadataError,
+    MapNotFound,
     PolygonMap,
 )
 from dubins_rrt_ros.planning.map_images import read_image
@@ -48,7 +50,9 @@ def load_map(path: str | os.PathLike, *, max_map_cells: int = 100_000_000) -> Gr
         A map in metres; its name is the file's.
 
     Raises:
-        MapError: the file cannot be used. One line, that names file, field, value and remedy.
+        MapNotFound: the file, or the image that it names, is not there or cannot be opened.
+        MapMetadataError: the YAML file is none, or a field in it is missing or wrong.
+        MapError: anything else in the files cannot be used. The message names file, field, value and remedy.
     """
     path = Path(os.path.expanduser(path))
     try:
@@ -79,15 +83,14 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike) -> None:
         image.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
         path.write_text(yaml.safe_dump(fields, sort_keys=False, default_flow_style=None, allow_unicode=True), "utf-8")
     except OSError as error:
-        raise _located(path, f"cannot be written ({error.strerror}); choose a directory that is writable") from None
+        raise MapError(f"{path}: cannot be written ({error.strerror}); choose a directory that is writable") from None
     except MapError as error:
         raise _located(path, error) from None
 
 
-def _located(path: Path, error: MapError | str) -> MapError:
-    """The error with the file's name, on one line that any terminal can show."""
-    text = " ".join(f"{path}: {error}".split())
-    return MapError("".join(c if c.isprintable() else ascii(c)[1:-1] for c in text))
+def _located(path: Path, error: MapError) -> MapError:
+    """The error, of its own kind, with the file's name."""
+    return type(error)(f"{path}: {error}")
 
 
 def _load(path: Path, max_map_cells: int) -> GridMap | PolygonMap:
@@ -104,31 +107,32 @@ def _load(path: Path, max_map_cells: int) -> GridMap | PolygonMap:
 def _open(path: Path) -> BinaryIO:
     # A pipe would wait for its other end.
     if os.path.exists(path) and not os.path.isfile(path):
-        raise MapError("is a directory, pipe or device; name a regular file")
+        raise MapNotFound("is a directory, pipe or device; name a regular file")
     try:
         return path.open("rb")
     except OSError as error:
-        raise MapError(f"cannot be read ({error.strerror}); correct the name or the file's permissions") from None
+        raise MapNotFound(f"cannot be read ({error.strerror}); correct the name or the file's permissions") from None
     except ValueError as error:
-        raise MapError(f"is no possible file name ({error}); correct the name") from None
+        raise MapNotFound(f"is no possible file name ({error}); correct the name") from None
 
 
-def _read_text(path: Path, max_bytes: int) -> str:
+def _read_text(path: Path, max_bytes: int, refusal: type[MapError] = MapError) -> str:
+    """The text of a file; what is no text raises a `refusal`."""
     with _open(path) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:
-        raise MapError(f"is larger than {max_bytes} bytes; split or simplify the map")
+        raise refusal(f"is larger than {max_bytes} bytes; split or simplify the map")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise MapError(f"is not UTF-8 at byte {error.start}; save it as UTF-8") from None
+        raise refusal(f"is not UTF-8 at byte {error.start}; save it as UTF-8") from None
     if not text.strip():
-        raise MapError("is empty; give a file with a map in it")
+        raise refusal("is empty; give a file with a map in it")
     return text
 
 
 def _load_grid(path: Path, max_map_cells: int) -> GridMap:
-    fields = _parse_yaml(_read_text(path, MAX_YAML_BYTES))
+    fields = _parse_yaml(_read_text(path, MAX_YAML_BYTES, MapMetadataError))
     image = _field(fields, "image", _text, "give the name of a PGM, PNG or BMP file")
     resolution = _field(fields, "resolution", _positive, "give the side of a cell in metres, above 0")
     origin = _field(fields, "origin", _pose, "give [x, y, yaw], three finite numbers in metres and radians")
@@ -137,12 +141,12 @@ def _load_grid(path: Path, max_map_cells: int) -> GridMap:
     free = _field(fields, "free_thresh", _fraction, "give a number from 0 to 1")
     mode = _field({"mode": "trinary", **fields}, "mode", _mode, f"give one of {', '.join(MODES)}")
     if free >= occupied:
-        raise MapError(f"free_thresh is {free} and occupied_thresh {occupied}; make free_thresh the smaller one")
+        raise MapMetadataError(f"free_thresh is {free} and occupied_thresh {occupied}; make free_thresh the smaller one")
     try:
         with _open(path.parent / image) as file:
             grey, transparent = read_image(file, max_map_cells)
     except MapError as error:
-        raise MapError(f"image {image!r} {error}") from None
+        raise type(error)(f"image {image!r} {error}") from None
     # Row 0 of an image is the top, of a grid the bottom.
     data = _cell_values(mode, negate, occupied, free)[grey[::-1]]
     if transparent is not None and mode != "raw":
@@ -156,21 +160,21 @@ def _parse_yaml(text: str) -> dict[str, Any]:
     try:
         document = yaml.load(text, Loader=yaml.BaseLoader)
     except RecursionError:
-        raise MapError("YAML is nested too deep; give the fields of a map_server map") from None
+        raise MapMetadataError("YAML is nested too deep; give the fields of a map_server map") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        raise MapError(f"is no valid YAML ({error}); correct the text") from None
+        raise MapMetadataError(f"is no valid YAML ({error}); correct the text") from None
     if not isinstance(document, dict):
-        raise MapError(f"YAML is {reprlib.repr(document)}; give the fields of a map_server map")
+        raise MapMetadataError(f"YAML is {reprlib.repr(document)}; give the fields of a map_server map")
     return document
 
 
 def _field(fields: dict[str, Any], name: str, convert: Callable[[Any], Any], remedy: str) -> Any:
     if name not in fields:
-        raise MapError(f"{name} is missing; {remedy}")
+        raise MapMetadataError(f"{name} is missing; {remedy}")
     try:
         return convert(fields[name])
     except (ValueError, TypeError, LookupError, AttributeError):
-        raise MapError(f"{name} is {reprlib.repr(fields[name])}; {remedy}") from None
+        raise MapMetadataError(f"{name} is {reprlib.repr(fields[name])}; {remedy}") from None
 
 
 def _text(value: Any) -> str:

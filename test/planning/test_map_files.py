@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from dubins_rrt_ros.planning.map import GridMap, MapError, PolygonMap, rasterise
+from dubins_rrt_ros.planning.map import GridMap, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
 from dubins_rrt_ros.planning.map_files import load_map, save_map
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -36,10 +36,11 @@ def write_grid(folder, rows=((254, 0, 205),), name="m.pgm", **changes):
     return folder / "m.yaml"
 
 
-def refusal(path, **options):
-    """The message of a refusal, that must be one printable line with the file's name and a remedy."""
+def refusal(path, kind=MapError, **options):
+    """The message of a refusal of a kind, that must be one printable line with the file's name and a remedy."""
     with pytest.raises(MapError) as caught:
         load_map(path, **options)
+    assert type(caught.value) is kind
     message = str(caught.value)
     assert message.isprintable()
     assert message.startswith(f"{path}: ")
@@ -140,8 +141,11 @@ def test_polygons_by_their_ending(tmp_path, ending):
     assert (yard.name, yard.free.area) == (path.name, 4)
 
 
+NO_FILES = ["no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', '"' + 300 * "n" + '"']
+
+
 @pytest.mark.parametrize("field, values", [
-    ("image", [None, "", "[a]", "no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', "m.yaml", '"' + 300 * "n" + '"']),
+    ("image", [None, "", "[a]", "m.yaml", *NO_FILES]),
     ("resolution", [None, "", "0", "-0.05", ".nan", "nan", "inf", "1e999", "five", "[0.05]"]),
     ("origin", [None, "", "0", "000", "[0, 0]", "[0, 0, 0, 0]", "[0, nan, 0]", "[0, 0, x]", "[[0], 0, 0]", "{x: 1}"]),
     ("negate", [None, "2", "maybe", "[]", ""]),
@@ -151,8 +155,9 @@ def test_polygons_by_their_ending(tmp_path, ending):
 ])
 def test_bad_field(tmp_path, field, values):
     for value in values:
-        message = refusal(write_grid(tmp_path, **{field: value}) if field != "image" else image_named(tmp_path, value))
-        assert field in message, value
+        kind = MapNotFound if value in NO_FILES else MapError if value == "m.yaml" else MapMetadataError
+        path = write_grid(tmp_path, **{field: value}) if field != "image" else image_named(tmp_path, value)
+        assert field in refusal(path, kind), value
 
 
 def image_named(folder, value):
@@ -169,7 +174,12 @@ def image_named(folder, value):
 ])
 def test_bad_yaml(tmp_path, content, word):
     (tmp_path / "bad.yaml").write_bytes(content)
-    assert word in refusal(tmp_path / "bad.yaml")
+    assert word in refusal(tmp_path / "bad.yaml", MapMetadataError)
+
+
+@pytest.mark.parametrize("field, value", [("resolution", "1e-9"), ("origin", "[1e9, 0, 0]")])
+def test_cells_that_cannot_be_planned_on(tmp_path, field, value):
+    assert "cannot be planned on" in refusal(write_grid(tmp_path, **{field: value}), MapMetadataError)
 
 
 @pytest.mark.parametrize("content, word", [
@@ -204,13 +214,14 @@ def test_long_polygon_files_are_refused(tmp_path, monkeypatch):
     assert "larger than 50 bytes" in refusal(tmp_path / "m.geojson")
 
 
-@pytest.mark.parametrize("name, word", [
-    ("no.yaml", "No such file"), ("folder.yaml", "directory"), ("m.pgm/m.wkt", "Not a directory"),
-    ("map.txt", "ending"), ("map", "ending"), ("n" * 300 + ".wkt", "too long")])
-def test_files_that_are_none(tmp_path, name, word):
+@pytest.mark.parametrize("name, word, kind", [
+    ("no.yaml", "No such file", MapNotFound), ("folder.yaml", "directory", MapNotFound),
+    ("m.pgm/m.wkt", "Not a directory", MapNotFound), ("n" * 300 + ".wkt", "too long", MapNotFound),
+    ("map.txt", "ending", MapError), ("map", "ending", MapError)])
+def test_files_that_are_none(tmp_path, name, word, kind):
     write_grid(tmp_path)
     (tmp_path / "folder.yaml").mkdir()
-    assert word in refusal(tmp_path / name)
+    assert word in refusal(tmp_path / name, kind)
 
 
 @pytest.mark.parametrize("name", ["nul\0.wkt", "two\nlines\x1b[0m.yaml", "\ud800.json", ""])
