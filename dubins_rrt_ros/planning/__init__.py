@@ -11,7 +11,7 @@ from .map import FREE, OCCUPIED, UNKNOWN, GridMap, Map, MapError, MapMetadataErr
 from .map_files import load_map, save_map
 from .options import OptionError, options, values
 from .path import Path
-from .planner import plan
+from .planner import plan, prepare
 from .problem import InvalidPose, Pose, Problem, checked_pose
 from .result import Plan, Progress, Status
 from .settings import Settings
@@ -22,5 +22,5 @@ __all__ = [
     "FREE", "OCCUPIED", "UNKNOWN", "WORDS", "Audit", "ClearanceField", "DubinsCurve", "GridMap", "InvalidPose", "Map",
     "MapError", "MapMetadataError", "MapNotFound", "OptionError", "Path", "Plan", "PolygonMap", "Pose", "Problem", "Progress",
     "Settings", "Status", "Tree", "TreeError", "Vehicle", "audit", "checked_pose", "kernels_compiled", "load_map", "options",
-    "plan", "rasterise", "save_map", "values",
+    "plan", "prepare", "rasterise", "save_map", "values",
 ]

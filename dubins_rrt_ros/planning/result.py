@@ -40,6 +40,7 @@ class Plan:
         path: the audited path, or None.
         tree: the search tree; it holds the start alone where nothing was searched.
         samples: how many samples were drawn.
+        culprit: (x, y) of what shows why there is no path: the nearest obstacle, the narrowest place, the first hit [m]; or None.
         cancelled: whether it was cancelled; with a path, that is the best by then.
         time_to_first: until the search found its first path, its audit not counted [s], or None.
         planning_time: from request to answer, the clearance field not counted [s].
@@ -57,6 +58,7 @@ class Plan:
     tree: Tree
     path: Path | None = None
     samples: int = 0
+    culprit: tuple[float, float] | None = None
     cancelled: bool = False
     time_to_first: float | None = None
     planning_time: float = 0.0

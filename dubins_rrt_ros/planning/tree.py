@@ -65,12 +65,15 @@ class Tree:
             node = self.parents[node]
         return Path(tuple(self.poses[0].tolist()), end, tuple(reversed(curves)))
 
-    def segments(self, spacing: float) -> np.ndarray:
-        """(m, 2, 2) float64: ends (x, y) [m] of the straight pieces that draw all edges; turns in pieces of `spacing` [m]."""
+    def segments(self, spacing: float, most: int | None = None) -> np.ndarray:
+        """(m, 2, 2) float64: ends (x, y) [m] of the straight pieces that draw all edges; turns in pieces of `spacing` [m].
+
+        No more than the first `most`, which lead to the oldest nodes.
+        """
         turning = np.array([[turn != "S" for turn in word] for word in WORDS])[self.words]
         pieces = np.where(turning, np.ceil(self.lengths / spacing), self.lengths > 0).astype(np.int64).ravel()
-        arc = np.repeat(np.arange(len(pieces)), pieces)
-        nth = np.arange(len(arc)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        arc = np.repeat(np.arange(len(pieces)), pieces)[:most]
+        nth = np.arange(len(arc)) - (np.cumsum(pieces) - pieces)[arc]
         begins = (np.cumsum(self.lengths, axis=1) - self.lengths).ravel()
         piece = self.lengths.ravel()[arc] / pieces[arc]
         out = np.empty((len(arc), 2, 2))

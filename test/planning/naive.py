@@ -8,6 +8,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
 SIDE = {"L": 1, "S": 0, "R": -1}
@@ -141,3 +142,37 @@ def costs(parents, lengths):
             out[node] += sum(lengths[at])
             at = parents[at]
     return out
+
+
+def widest(clearance, start, targets):
+    """The largest clearance with which neighbours in a (rows, columns) array lead from `start` to one of `targets`; else 0."""
+    for level in np.unique(clearance[clearance > 0])[::-1]:
+        reached, waiting = set(), [start]
+        while waiting:
+            row, column = node = waiting.pop()
+            inside = 0 <= row < clearance.shape[0] and 0 <= column < clearance.shape[1]
+            if inside and node not in reached and clearance[node] >= level:
+                reached.add(node)
+                waiting += [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]
+        if reached & set(targets):
+            return level
+    return 0.0
+
+
+def free_space(map, allow_unknown=False):
+    """The free space of any map as shapely polygons."""
+    if hasattr(map, "free"):
+        return map.free
+    values = map.data.astype(int)
+    rows, columns = np.nonzero(values >= 65 if allow_unknown else (values > 25) | (values < 0))
+    left, low = columns * map.resolution, rows * map.resolution
+    obstacles = shapely.union_all(shapely.box(left, low, left + map.resolution, low + map.resolution))
+    return shapely.transform(shapely.box(0, 0, *map.size) - obstacles, map.to_map_frame)
+
+
+def are_connected(problem, radius):
+    """Whether a disc moves from start to goal: whether these lie in one part of the free space, made smaller by the radius."""
+    room = shapely.buffer(free_space(problem.map, problem.allow_unknown), -radius, quad_segs=32)
+    reached = [part for part in shapely.get_parts(room) if part.distance(shapely.Point(problem.start[:2])) < 1e-9]
+    goal = shapely.Point(problem.goal[:2])
+    return any(part.distance(goal) <= problem.goal_tolerance_xy + 1e-9 for part in reached)

@@ -7,7 +7,19 @@ import pytest
 import shapely
 from cases import empty_map, needs_compiled, scaled
 
-from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Settings, Status, Tree, Vehicle, audit, load_map, plan
+from dubins_rrt_ros.planning import (
+    GridMap,
+    PolygonMap,
+    Problem,
+    Settings,
+    Status,
+    Tree,
+    Vehicle,
+    audit,
+    load_map,
+    plan,
+    prepare,
+)
 from dubins_rrt_ros.share import maps_directory
 
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
@@ -31,7 +43,7 @@ def settings(planner, **options):
 
 
 def hard_to_reach():
-    """The goal is behind a gap that is wide enough for the disc, not for its turning radius."""
+    """The goal is behind a gap that is wide enough for the disc, but hardly for its turning radius."""
     data = np.zeros((40, 40))
     data[:, 20] = 100
     data[20, 20] = 0
@@ -48,6 +60,7 @@ def walled(value=100):
 def assert_refused(result, status, *words):
     assert result.status == status
     assert result.path is result.length is result.gap is None
+    assert result.culprit is None or (len(result.culprit) == 2 and all(type(c) is float for c in result.culprit))
     assert result.audit == ""
     assert len(result.tree) >= 1
     assert "\n" not in result.message
@@ -122,17 +135,39 @@ def test_the_sample_budget_ends_it(planner):
 
 def test_cancelled_before_the_first_path(planner):
     asked = []
-    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 3)
+    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 4)
     assert_refused(result, Status.CANCELLED, "Cancelled before a first path", "samples drawn")
-    assert len(asked) == 3
+    assert result.cancelled
+    assert len(asked) == 4
     assert 0 < result.samples < settings(planner).samples
 
 
-def test_cancelled_at_once(planner):
+def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.ClearanceField", None)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: True)
+    assert_refused(result, Status.CANCELLED, "Cancelled before a first path: 0 of", "samples drawn, 1 tree node, ")
+    assert (result.samples, len(result.tree), result.map_time) == (0, 1, 0.0)
+
+
+def test_cancelled_while_the_clearance_field_was_computed(planner, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.reasons", None)
+    asked = []
+    result = plan(Problem(walled(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 2)
     assert_refused(result, Status.CANCELLED)
-    assert result.samples == 0
-    assert len(result.tree) == 1
+    assert result.map_time > 0
+
+
+def test_prepare_does_what_does_not_depend_on_the_request(monkeypatch):
+    from dubins_rrt_ros.planning import ClearanceField
+    from dubins_rrt_ros.planning import clearance as module
+
+    map = walled(-1)
+    prepare(map, VEHICLE, allow_unknown=True)
+    monkeypatch.setattr(module, "_grid_parts", None)
+    monkeypatch.setattr(module.ndimage, "label", None)
+    assert ClearanceField.of(map, True).components(VEHICLE.robot_radius).max() == 1
+    result = plan(Problem(map, VEHICLE, START, GOAL, allow_unknown=True), settings("rrt_star", samples=1))
+    assert result.map_time < 0.01
 
 
 def test_cancelled_after_the_first_path_gives_the_best_so_far():
@@ -149,7 +184,8 @@ def test_cancelled_after_the_first_path_gives_the_best_so_far():
 @pytest.mark.parametrize("map", [walled(), PolygonMap(shapely.box(-10, -10, 10, 10) - shapely.box(-0.5, -11, 0.5, 11))])
 def test_proves_that_there_is_no_way(planner, map):
     result = plan(Problem(map, VEHICLE, START, GOAL), settings(planner))
-    assert_refused(result, Status.NO_VALID_PATH, "No path exists", "robot_radius 0.2 m")
+    assert_refused(result, Status.NO_VALID_PATH, "No path exists: walls separate start and goal")
+    assert result.culprit is None
     assert result.samples == 0
     assert len(result.tree) == 1
 
@@ -187,21 +223,28 @@ def test_a_boxed_in_start_is_told(planner):
     problem = Problem(GridMap(data, 0.5), Vehicle(1.0, 0.3), (10.55, 10.0, 0.0), (3.0, 3.0, 0.0))
     result = plan(problem, settings(planner, samples=50))
     assert result.status == Status.NO_VALID_PATH
-    assert "left the start" in result.message
+    assert "every forward arc from the start hits an obstacle within 0.16 m, the longest at (11.00, 9.99)" in result.message
+    assert "move or turn the start" in result.message
+    assert result.culprit == pytest.approx((11.0, 9.99), abs=0.01)
 
 
-@pytest.mark.parametrize("pose", [(-10.5, 0, 0), (0, 10.01, 0), (1e9, 0, 0)])
-def test_outside_the_map(planner, pose):
-    words = (f"({pose[0]:g}, {pose[1]:g})", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the pose")
+@pytest.mark.parametrize("pose, by", [((-10.5, 0, 0), "0.50 m"), ((0, 10.01, 0), "0.01 m"), ((0, 10.0004, 0), "0.0004 m"),
+                                      ((13.0, -14.0, 0), "5.00 m"), ((1e9, 0, 0), "999999990.00 m")])
+def test_outside_the_map(planner, pose, by):
+    words = (f"({pose[0]:g}, {pose[1]:g}) is {by} outside the map", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the")
     result = plan(Problem(empty_map(), VEHICLE, pose, GOAL), settings(planner))
     assert_refused(result, Status.START_OUTSIDE_MAP, "Start", *words)
     result = plan(Problem(empty_map(), VEHICLE, START, pose), settings(planner))
     assert_refused(result, Status.GOAL_OUTSIDE_MAP, "Goal", *words)
+    assert result.culprit == pytest.approx(np.clip(pose[:2], -10, 10))
 
 
-@pytest.mark.parametrize("pose, clearance", [((0, 0, 0), "0 m"), ((0.6, 0, 0), "0.1 m"), ((9.9, 0, 0), "0.1 m")])
-def test_occupied(planner, pose, clearance):
-    words = (f"is occupied: clearance {clearance}", "needed 0.2005 m", "robot_radius")
+@pytest.mark.parametrize("pose, words", [
+    ((0, 0, 0), ("clearance 0.00 m", "(0.00, 0.00) lies in an obstacle; move it.")),
+    ((0.6, 0, 0), ("clearance 0.10 m", "nearest obstacle at (0.50, 0.00); move it", "robot_radius")),
+    ((9.9, 0, 0), ("clearance 0.10 m", "nearest obstacle is the map's edge at (10.00, 0.00)", "robot_radius"))])
+def test_occupied(planner, pose, words):
+    words = ("is occupied: ", ", needed 0.20 m", *words)
     result = plan(Problem(walled(), VEHICLE, pose, GOAL), settings(planner))
     assert_refused(result, Status.START_OCCUPIED, "Start", *words)
     result = plan(Problem(walled(), VEHICLE, START, pose), settings(planner))
@@ -211,9 +254,25 @@ def test_occupied(planner, pose, clearance):
 
 def test_unknown_space_is_named_as_the_cause(planner):
     problem = Problem(walled(-1), VEHICLE, (0.0, 0.0, 0.0), GOAL)
-    assert_refused(plan(problem, settings(planner)), Status.START_OCCUPIED, "only unknown space", "allow_unknown")
+    assert_refused(plan(problem, settings(planner)), Status.START_OCCUPIED, "lies in unknown space", "allow_unknown")
     allowed = Problem(walled(-1), VEHICLE, (0.0, 0.0, 0.0), GOAL, allow_unknown=True)
     assert plan(allowed, settings(planner)).status == Status.NONE
+
+
+@pytest.mark.parametrize("goal", [(10.1, 3.0, 0.5), (0.0, -3.0, 0.5), (0.3, 3.0, -2.0)])
+@pytest.mark.parametrize("any_heading", [False, True])
+def test_the_tolerance_excuses_a_goal_outside_or_in_an_obstacle(planner, goal, any_heading):
+    data = np.zeros((80, 80))
+    data[:60, 39:41] = 100
+    problem = Problem(GridMap(data, 0.25, (-10.0, -10.0, 0.0)), VEHICLE, START, goal, goal_tolerance_xy=0.6,
+                      any_goal_heading=any_heading)
+    result = plan(problem, settings(planner, samples=scaled(6000, least=3000)))
+    assert result.status == Status.NONE, result.message
+    assert audit(result.path, problem).ok
+    assert math.dist(result.path.end[:2], goal[:2]) <= 0.6
+    assert result.min_clearance >= 0.2
+    exact = plan(Problem(problem.map, VEHICLE, START, goal), settings(planner))
+    assert exact.status == (Status.GOAL_OUTSIDE_MAP if goal[0] > 10 else Status.GOAL_OCCUPIED)
 
 
 def test_start_equal_to_goal(planner):
@@ -257,6 +316,7 @@ def test_progress_tells_of_every_better_path():
     problem = Problem(walled_with_a_gap(), VEHICLE, START, GOAL)
     result = plan(problem, settings("rrt_star"), on_progress=on_progress)
     assert result.status == Status.NONE
+    assert " so far" not in result.message
     better = [progress.length for progress in told if progress.improved]
     assert len(better) >= 1
     assert better == sorted(better, reverse=True)
@@ -268,6 +328,7 @@ def test_progress_tells_of_every_better_path():
         assert snapshot.samples == progress.samples
         assert (snapshot.path is None) == (progress.length is None)
         if snapshot.path:
+            assert snapshot.message.startswith(f"Path of {snapshot.length:.2f} m so far, at most ")
             assert snapshot.audit == "ok"
             assert audit(snapshot.path, problem).ok
             assert snapshot.length == pytest.approx(progress.length)
@@ -279,6 +340,16 @@ def walled_with_a_gap():
     data = np.array(grid.data)
     data[30:, :] = 0
     return GridMap(data, grid.resolution, grid.origin)
+
+
+def test_a_snapshot_without_a_path_says_that_the_search_goes_on(planner, monkeypatch):
+    now = iter(np.arange(1e6) / 10)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
+    messages = []
+    plan(hard_to_reach(), settings(planner, samples=20, planning_time=1000.0),
+         on_progress=lambda progress: messages.append(progress.snapshot().message))
+    assert messages
+    assert all(message.startswith("No path so far: ") for message in messages)
 
 
 def test_progress_of_rrt_has_one_path():

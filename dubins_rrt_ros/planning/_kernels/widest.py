@@ -1,0 +1,169 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""The widest way between points of a square lattice: the one whose narrowest place has the most clearance.
+
+A flood that enters the neighbour with the most clearance first. What has at least the clearance of the narrowest place so
+far, the level, waits in a queue, first in, first out, so that ways are short in open space; what has less waits in a heap.
+"""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+else:
+    from .clearance import Clearance
+
+#: What is known of a node: how it was entered (from the left, the right, below, above, or as the start), or nothing.
+UNSEEN = cython.declare(cython.schar, 0)
+FROM_LEFT = cython.declare(cython.schar, 1)
+FROM_RIGHT = cython.declare(cython.schar, 2)
+FROM_BELOW = cython.declare(cython.schar, 3)
+FROM_ABOVE = cython.declare(cython.schar, 4)
+START = cython.declare(cython.schar, 5)
+
+
+@cython.cclass
+class Flood:
+    """A flood over a lattice; node `row * columns + column` lies `column` steps along and `row` steps across from the first."""
+
+    clearance: Clearance
+    rows: cython.int
+    columns: cython.int
+    x0: cython.double
+    y0: cython.double
+    along_x: cython.double
+    along_y: cython.double
+    least: cython.double
+    level: cython.double
+    is_target: cython.schar[::1]
+    entered: cython.schar[::1]
+    queue: cython.int[::1]
+    queued: cython.int
+    heap: cython.int[::1]
+    keys: cython.double[::1]
+    heaped: cython.int
+
+    def __init__(self, clearance: Clearance, first, along, shape, is_target, least, enough):
+        """
+        Args:
+            first, along: (x, y) of the first node, and the step along a row [m]; that across is the same turned left.
+            shape: (rows, columns).
+            is_target: (rows * columns,) int8, not 0 for each node where the flood may end.
+            least: nodes without more clearance than this are not entered [m].
+            enough: more clearance than this counts as this [m].
+        """
+        self.clearance = clearance
+        self.rows, self.columns = shape
+        self.x0, self.y0 = first
+        self.along_x, self.along_y = along
+        self.least, self.level = least, enough
+        self.is_target = is_target
+        nodes = self.rows * self.columns
+        self.entered = np.zeros(nodes, np.int8)
+        self.queue, self.heap, self.keys = np.empty(nodes, np.int32), np.empty(nodes, np.int32), np.empty(nodes)
+        self.queued = self.heaped = 0
+
+    def widest_way(self, start: cython.int):
+        """The least clearance on the widest way [m], at most `enough`, and the way's nodes as (n,) int32; 0 and none
+        where no target can be reached."""
+        target: cython.int
+        with cython.nogil:
+            target = self.flood(start)
+        return (self.level, self.way_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def flood(self, start: cython.int) -> cython.int:
+        """Flood from `start` until a target is reached, and return it, or -1."""
+        node: cython.int
+        row: cython.int
+        column: cython.int
+        served: cython.int = 0
+        self.enter(start, START)
+        while served < self.queued or self.heaped > 0:
+            if served < self.queued:
+                node = self.queue[served]
+                served += 1
+            else:
+                self.level = self.keys[0]
+                node = self.pop()
+            if self.is_target[node]:
+                return node
+            row, column = node // self.columns, node % self.columns
+            if column + 1 < self.columns:
+                self.enter(node + 1, FROM_LEFT)
+            if column > 0:
+                self.enter(node - 1, FROM_RIGHT)
+            if row + 1 < self.rows:
+                self.enter(node + self.columns, FROM_BELOW)
+            if row > 0:
+                self.enter(node - self.columns, FROM_ABOVE)
+        return -1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def enter(self, node: cython.int, how: cython.schar) -> cython.void:
+        """Let an unseen node wait in the queue or the heap, if it has more than the least clearance."""
+        if self.entered[node] != UNSEEN:
+            return
+        self.entered[node] = how
+        row: cython.int = node // self.columns
+        column: cython.int = node % self.columns
+        x: cython.double = self.x0 + column * self.along_x - row * self.along_y
+        y: cython.double = self.y0 + column * self.along_y + row * self.along_x
+        found: cython.double = self.clearance.at_least(x, y, self.level)
+        if found <= self.least:
+            return
+        if found >= self.level:
+            self.queue[self.queued] = node
+            self.queued += 1
+        else:
+            self.push(node, found)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def push(self, node: cython.int, key: cython.double) -> cython.void:
+        """Add a node to the heap, which has the largest key on top."""
+        i: cython.int = self.heaped
+        self.heaped += 1
+        while i > 0 and self.keys[(i - 1) // 2] < key:
+            self.heap[i], self.keys[i] = self.heap[(i - 1) // 2], self.keys[(i - 1) // 2]
+            i = (i - 1) // 2
+        self.heap[i], self.keys[i] = node, key
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def pop(self) -> cython.int:
+        """Take the node with the largest key from the heap."""
+        top: cython.int = self.heap[0]
+        self.heaped -= 1
+        last: cython.int = self.heap[self.heaped]
+        key: cython.double = self.keys[self.heaped]
+        i: cython.int = 0
+        child: cython.int = 1
+        while child < self.heaped:
+            if child + 1 < self.heaped and self.keys[child + 1] > self.keys[child]:
+                child += 1
+            if self.keys[child] <= key:
+                break
+            self.heap[i], self.keys[i] = self.heap[child], self.keys[child]
+            i, child = child, 2 * child + 1
+        self.heap[i], self.keys[i] = last, key
+        return top
+
+    def way_to(self, node: cython.int):
+        """(n,) int32: the nodes by which `node` was reached, from the start on."""
+        way = [node]
+        while self.entered[node] != START:
+            if self.entered[node] == FROM_LEFT:
+                node -= 1
+            elif self.entered[node] == FROM_RIGHT:
+                node += 1
+            else:
+                node += -self.columns if self.entered[node] == FROM_BELOW else self.columns
+            way.append(node)
+        return np.array(way[::-1], np.int32)

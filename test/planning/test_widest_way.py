@@ -1,0 +1,122 @@
+"""The widest way between two places: the flood against brute force, and what is said of ways against shapely."""
+
+import math
+import re
+from dataclasses import replace
+
+import naive
+import numpy as np
+import pytest
+import shapely
+from cases import SCALE, boxes_grid, holed_polygons, naive_clearance, scaled
+from naive import are_connected, free_space
+
+from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
+from dubins_rrt_ros.planning._kernels.widest import Flood
+from dubins_rrt_ros.planning.bounds import are_separated, lattice_spacing, widest_way
+from dubins_rrt_ros.planning.clearance import MARGIN
+from dubins_rrt_ros.planning.reasons import before_search
+
+
+@pytest.mark.parametrize("seed", range(scaled(30, least=6)))
+def test_the_flood_finds_the_widest_way(seed):
+    rng = np.random.default_rng(seed)
+    map = boxes_grid(rng, side=int(rng.integers(3, 12)), boxes=int(rng.integers(0, 14)))
+    shape = tuple(rng.integers(2, 16, 2).tolist())
+    corner, end = map.corners()[:2]
+    step = (end - corner) / max(shape)
+    first = corner + 0.3 * step
+    turned = np.array([-step[1], step[0]])
+    nodes = first + np.arange(shape[1])[None, :, None] * step + np.arange(shape[0])[:, None, None] * turned
+    enough, least = rng.uniform(0.1, 1.0), rng.choice([0.0, 0.05])
+    clearance = np.minimum(naive_clearance(map)(nodes.reshape(-1, 2)).reshape(shape), enough)
+    start, *targets = (tuple(at) for at in rng.integers(0, shape, (4, 2)).tolist())
+    is_target = np.zeros(shape, np.int8)
+    is_target[tuple(np.transpose(targets))] = 1
+    flood = Flood(ClearanceField.of(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least, enough)
+    found, way = flood.widest_way(start[0] * shape[1] + start[1])
+    assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
+    if found == 0:
+        assert len(way) == 0
+        return
+    rows, columns = np.divmod(way, shape[1])
+    assert (rows[0], columns[0]) == start
+    assert (rows[-1], columns[-1]) in targets
+    assert (np.abs(np.diff(rows)) + np.abs(np.diff(columns)) == 1).all()
+    assert clearance[rows, columns].min() == pytest.approx(found, abs=1e-9)
+
+
+def crowded_problem(rng):
+    """Two of the places with most room in a crowded map, and a vehicle that hardly fits in there."""
+    kind = rng.integers(4)
+    map = (boxes_grid(rng, boxes=50, unknown=kind == 0) if kind < 2
+           else holed_polygons(rng, "circles" if kind == 2 else "boxes", count=40))
+    corners, clearance = map.corners(), naive_clearance(map)
+    points = corners[0] + rng.random((500, 2)) @ (corners[[1, 3]] - corners[0])
+    start, goal = points[rng.choice(np.argsort(clearance(points))[-60:], 2, replace=False)]
+    radius = float(rng.uniform(0.6, 1.0) * clearance(np.array([start, goal])).min()) - MARGIN
+    tolerance = float(rng.choice([0.0, 0.2]))
+    return Problem(map, Vehicle(0.5, radius), (*start.tolist(), 0.0), (*goal.tolist(), 0.0), goal_tolerance_xy=tolerance)
+
+
+def test_the_widest_way_is_as_wide_as_it_says_and_hardly_narrower_than_any():
+    """By shapely, on grids and polygons: what is left of the free space when its edge is moved inwards."""
+    rng = np.random.default_rng(5)
+    narrow = 0
+    for _ in range(40 if SCALE == 1 else 8):
+        problem = crowded_problem(rng)
+        field = ClearanceField.of(problem.map)
+        spacing = lattice_spacing(problem.map, field)
+        way = widest_way(problem, field)
+        if way is None:
+            assert not are_connected(problem, 2 * spacing)
+            continue
+        assert are_connected(problem, (1 - 1e-4) * way.radius)
+        assert field.at(way.points).min() >= way.radius
+        assert tuple(way.points[0]) == problem.start[:2]
+        assert math.dist(way.points[-1], problem.goal[:2]) <= problem.goal_tolerance_xy + 1e-9
+        if way.radius < problem.vehicle.robot_radius:
+            assert not are_connected(problem, way.radius + 3 * spacing)
+            narrow += 1
+    assert narrow > 3
+
+
+def test_random_problems_have_true_reasons():
+    """What is refused before the search cannot be solved, by shapely."""
+    rng = np.random.default_rng(11)
+    seen = set()
+    for seed in range(50 if SCALE == 1 else 20):
+        problem = crowded_problem(rng)
+        if seed % 2:
+            corners = problem.map.corners()
+            anywhere = corners[0] + rng.uniform(-0.1, 1.1, 2) @ (corners[[1, 3]] - corners[0])
+            problem = replace(problem, goal=(*anywhere.tolist(), 0.0))
+        clearance = naive_clearance(problem.map)
+        field = ClearanceField.of(problem.map, problem.allow_unknown)
+        reason = before_search(problem, field)
+        if reason is None:
+            continue
+        seen.add(reason.status)
+        need = problem.vehicle.robot_radius + MARGIN
+        if reason.status in (Status.START_OCCUPIED, Status.START_OUTSIDE_MAP):
+            assert clearance(np.array([problem.start[:2]]))[0] < need
+        elif reason.status in (Status.GOAL_OCCUPIED, Status.GOAL_OUTSIDE_MAP):
+            assert clearance(np.array([problem.goal[:2]]))[0] < need
+            room = shapely.buffer(free_space(problem.map, problem.allow_unknown), -need)
+            assert room.is_empty or room.distance(shapely.Point(problem.goal[:2])) > problem.goal_tolerance_xy - 1e-4
+        else:
+            assert are_separated(problem, field)
+            assert not are_connected(problem, need)
+            check_claimed_radius(problem, reason.message)
+    assert seen >= {Status.GOAL_OCCUPIED, Status.GOAL_OUTSIDE_MAP, Status.NO_VALID_PATH}
+
+
+def check_claimed_radius(problem, message):
+    """A radius that would do does, and unknown space that is blamed is to blame."""
+    if found := re.search(r"with radius ([\d.]+) m instead", message):
+        assert 0 < float(found[1]) < problem.vehicle.robot_radius
+        assert are_connected(problem, float(found[1]))
+    if "unknown space separates" in message:
+        assert are_connected(replace(problem, allow_unknown=True), problem.vehicle.robot_radius)
+    if "no robot_radius" in message:
+        assert not are_connected(problem, 1e-4)
