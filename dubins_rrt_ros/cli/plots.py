@@ -19,7 +19,7 @@ from dubins_rrt_ros.planning.map import OCCUPIED_FROM
 
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
-TREE, PATH, START, GOAL = "#a9c8e4", "#d55e00", "#009e73", "#0072b2"
+TREE, PATH, START, GOAL, CULPRIT = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
 DPI = 160
 #: The longer side of the map in the picture, what the labels around it need, and the least width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
@@ -38,6 +38,7 @@ class Drawing(NamedTuple):
         path: (n, 2) or (n, 3) points of the path [m], none where there is no path.
         title: one sentence with what matters most.
         subtitle: the other figures.
+        culprit: (x, y) of what keeps a path from being there [m], or None.
     """
 
     map: Map
@@ -48,6 +49,7 @@ class Drawing(NamedTuple):
     path: np.ndarray
     title: str
     subtitle: str
+    culprit: tuple[float, float] | None = None
 
 
 def draw_plan(file: str, plan: Plan) -> None:
@@ -56,7 +58,7 @@ def draw_plan(file: str, plan: Plan) -> None:
     path = plan.path.poses(plan.settings.path_spacing) if plan.path else np.empty((0, 3))
     title, subtitle = _captions(plan)
     draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle.robot_radius,
-                       plan.tree.segments(size / 400), path, title, subtitle))
+                       plan.tree.segments(size / 400), path, title, subtitle, plan.culprit))
 
 
 def _captions(plan: Plan) -> tuple[str, str]:
@@ -100,6 +102,8 @@ def draw(file: str, drawing: Drawing) -> None:
     # Behind the start and ahead of the goal, where no path runs.
     _draw_name(axes, "start", drawing.start, START, -max(1.3 * drawing.robot_radius, 0.3 * arrow))
     _draw_name(axes, "goal", drawing.goal, GOAL, 1.1 * arrow)
+    if drawing.culprit is not None:
+        axes.plot(*drawing.culprit, "x", color=CULPRIT, markersize=12, markeredgewidth=3, zorder=6)
     figure.savefig(file, dpi=DPI)
 
 
