@@ -45,6 +45,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         installed("", "package.xml"),
         installed("maps", "maps/*"),
+        installed("config", "config/*"),
         # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
         (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt"]),
     ],
@@ -53,7 +54,7 @@ setup(
     extras_require={"ros": ROS, "test": TEST},
     entry_points={
         "console_scripts": [
-            f"planner = {PACKAGE}.node.planner_node:main",
+            f"planner = {PACKAGE}.node.main:main",
             f"dubins_rrt = {PACKAGE}.cli.main:main",
         ],
     },

@@ -2,6 +2,6 @@
 
 import sys
 
-from .planner_node import main
+from .main import main
 
 sys.exit(main())

@@ -2,12 +2,13 @@
 
 import array
 import math
+from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion, Transform
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Header
@@ -24,13 +25,20 @@ TILT_TOLERANCE = 0.01
 RASTER_RESOLUTION, RASTER_CELLS = 0.05, 500_000
 
 
-def pose_from(name: str, message: PoseStamped | PoseWithCovarianceStamped) -> Pose:
-    """The (x [m], y [m], yaw [rad]) of a stamped pose, yaw in (-pi, pi]; its height does not matter.
+def bare_pose(message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> PoseMessage:
+    """The pose in a message, without its header."""
+    while not isinstance(message, PoseMessage):
+        message = message.pose
+    return message
+
+
+def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> Pose:
+    """The (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height does not matter.
 
     Raises:
         InvalidPose: it is not finite, no rotation or tilted; `name` is in the message.
     """
-    pose = message.pose.pose if isinstance(message, PoseWithCovarianceStamped) else message.pose
+    pose = bare_pose(message)
     p = pose.position
     if not all(map(math.isfinite, (p.x, p.y, p.z))):
         raise InvalidPose(f"The {name} pose is at x {p.x}, y {p.y}, z {p.z}; give finite metres.")
@@ -42,6 +50,31 @@ def pose_message(pose: Pose) -> PoseMessage:
     message = PoseMessage()
     _fill(message, *_rows(np.array([pose]))[0])
     return message
+
+
+def transformed(pose: PoseMessage, transform: Transform) -> PoseMessage:
+    """A pose in the frame that a transform leads to, as tf2 has it: rotate, then translate."""
+    t, p, q = transform.translation, pose.position, pose.orientation
+    turn = _Quaternion(*(getattr(transform.rotation, axis) for axis in "wxyz"))
+    x, y, z = (turn * _Quaternion(0.0, p.x, p.y, p.z) * turn.conjugate)[1:]
+    w, i, j, k = turn * _Quaternion(q.w, q.x, q.y, q.z)
+    return PoseMessage(position=Point(x=x + t.x, y=y + t.y, z=z + t.z), orientation=Quaternion(w=w, x=i, y=j, z=k))
+
+
+class _Quaternion(NamedTuple):
+    w: float
+    x: float
+    y: float
+    z: float
+
+    def __mul__(self, other: "_Quaternion") -> "_Quaternion":
+        a, b = self, other
+        return _Quaternion(a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                           a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w)
+
+    @property
+    def conjugate(self) -> "_Quaternion":
+        return _Quaternion(self.w, -self.x, -self.y, -self.z)
 
 
 def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:

@@ -15,20 +15,29 @@ TREE_COLOR = ColorRGBA(r=0.35, g=0.55, b=0.85, a=0.6)
 PATH_COLOR = ColorRGBA(r=0.90, g=0.30, b=0.10, a=1.0)
 START_COLOR = ColorRGBA(r=0.10, g=0.60, b=0.20, a=1.0)
 GOAL_COLOR = ColorRGBA(r=0.75, g=0.10, b=0.50, a=1.0)
+CULPRIT_COLOR = ColorRGBA(r=0.95, g=0.75, b=0.05, a=0.9)
 #: A chord as long as this share of the turning radius strays from its arc by 1 % of the radius.
 CHORD = 0.3
 
 
-def tree_markers(plan: Plan | None, frame: str, stamp: Time) -> MarkerArray:
-    """Clears what was shown, then shows the tree, start, goal and path of `plan`, if there is one."""
+def tree_markers(plan: Plan | None, frame: str, stamp: Time, most: int) -> MarkerArray:
+    """Clears what was shown, then shows the tree, start, goal and path of `plan`, if there is one, and where it failed.
+
+    Args:
+        plan: what to show.
+        frame, stamp: of every marker.
+        most: how many lines of the tree at most, those of its oldest nodes: a large tree keeps RViz and the node busy.
+    """
     header = Header(stamp=stamp, frame_id=frame)
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     if plan is not None:
         radius = plan.problem.vehicle.turning_radius
         width = 0.02 * radius
-        markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius), width, TREE_COLOR)
+        markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius, most), width, TREE_COLOR)
         markers.append(_arrow(header, "start", plan.problem.start, radius, START_COLOR))
         markers.append(_arrow(header, "goal", plan.problem.goal, radius, GOAL_COLOR))
+        if plan.culprit is not None:
+            markers.append(_disc(header, "culprit", plan.culprit, 0.3 * radius, CULPRIT_COLOR))
         if plan.path is not None:
             poses = plan.path.poses(min(plan.settings.path_spacing, CHORD * radius))
             markers += _lines(header, "path", Marker.LINE_STRIP, poses[:, :2], 3 * width, PATH_COLOR)
@@ -49,3 +58,8 @@ def _lines(header: Header, namespace: str, kind: int, points: np.ndarray, width:
 def _arrow(header: Header, namespace: str, pose: Pose, radius: float, color: ColorRGBA) -> Marker:
     return Marker(header=header, ns=namespace, type=Marker.ARROW, action=Marker.ADD, pose=pose_message(pose),
                   scale=Vector3(x=0.6 * radius, y=0.12 * radius, z=0.12 * radius), color=color)
+
+
+def _disc(header: Header, namespace: str, point: tuple[float, float], diameter: float, color: ColorRGBA) -> Marker:
+    return Marker(header=header, ns=namespace, type=Marker.CYLINDER, action=Marker.ADD, pose=pose_message((*point, 0.0)),
+                  scale=Vector3(x=diameter, y=diameter, z=0.02), color=color)

@@ -1,6 +1,7 @@
 """The node's parameters, declared from the options of the library's dataclasses."""
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,11 +19,13 @@ class NodeOptions:
         OptionError: a field is of the wrong type or out of range.
     """
 
-    map_file: str = option("", "a map file, or the name of an installed map; empty: the map comes by topic")
+    map_file: str = option("", "a map file, its URL, or the name of an installed map; empty: the map comes by topic")
     global_frame: str = option("map", "the frame of map, poses and path")
     map_transient_local: bool = option(True, "the map topic's publisher is transient local, as map_server's is")
     max_map_cells: int = option(100_000_000, "the largest map that is taken", unit="cells", low=1, high=2**31 - 1)
     publish_tree: bool = option(True, "show the tree on ~/tree while somebody subscribes")
+    replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
+                                               "is no longer free")
 
     def __post_init__(self):
         convert_options(self)
@@ -40,10 +43,14 @@ class Configuration:
     problem: Mapping[str, Any]
 
 
-CLASSES = (NodeOptions, Vehicle, Problem, Settings)
+#: The classes whose options are parameters, and what they are about.
+CLASSES = {NodeOptions: "The node", Vehicle: "The vehicle", Problem: "The request", Settings: "The planner"}
 OPTIONS: dict[str, Option] = {item.name: item for cls in CLASSES for item in options(cls)}
-#: They shape topics and are read once; a change at run time would have no effect.
-READ_ONLY = frozenset({"map_file", "global_frame", "map_transient_local"})
+_RESTART = "start the node again with another value"
+#: They shape topics and are read once, as a change at run time would have no effect; and what to do instead.
+READ_ONLY = {"map_file": f"load another map by ~/load_map, or {_RESTART}", "global_frame": _RESTART,
+             "map_transient_local": _RESTART}
+
 
 class Parameters:
     """The parameters of a node.
@@ -60,22 +67,43 @@ class Parameters:
             _declare(node, item)
         self.read()
         # Only now: while they are declared one by one, values that belong together come one by one.
-        node.add_on_set_parameters_callback(self._check)
+        node.add_on_set_parameters_callback(self.check)
 
     def read(self) -> Configuration:
         """The present values."""
         return configuration(self._values())
 
-    def _values(self) -> dict[str, Any]:
-        return {name: self._node.get_parameter(name).value for name in OPTIONS}
+    def unknown(self) -> list[str]:
+        """A warning, of one sentence, for each value given at start-up whose parameter is declared by nobody."""
+        # rclpy has no public way to the values that were given; without this one nothing is lost but the warnings.
+        given = getattr(self._node, "_parameter_overrides", {})
+        return [_unknown(name) for name in given if not (self._node.has_parameter(name) or name.startswith("qos_overrides."))]
 
-    def _check(self, changes) -> SetParametersResult:
-        wanted = self._values() | {change.name: change.value for change in changes if change.name in OPTIONS}
+    def check(self, changes: Iterable) -> SetParametersResult:
+        """Whether changes, given as rclpy's Parameters, can be taken together; the reason of a refusal says what to do.
+
+        rclpy asks it last, after its own checks of ranges and of what is read-only, whose reasons name no remedy.
+        """
+        wanted = {change.name: change.value for change in changes if change.name in OPTIONS}
         try:
-            configuration(wanted)
+            for name, value in wanted.items():
+                _check_alone(name, value)
+            self._check_together(wanted)
         except OptionError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _check_together(self, wanted: Mapping[str, Any]) -> None:
+        try:
+            configuration(self._values() | wanted)
+        except OptionError as error:
+            if len(wanted) > 1:
+                raise
+            service = f"{self._node.get_fully_qualified_name()}/set_parameters_atomically"
+            raise OptionError(f"{error}; while the node runs, change what belongs together in one call of {service}") from None
+
+    def _values(self) -> dict[str, Any]:
+        return {name: self._node.get_parameter(name).value for name in OPTIONS}
 
 
 def configuration(values: Mapping[str, Any]) -> Configuration:
@@ -92,7 +120,7 @@ def configuration(values: Mapping[str, Any]) -> Configuration:
 def descriptor(item: Option) -> ParameterDescriptor:
     """What `ros2 param describe` tells of an option."""
     result = ParameterDescriptor(name=item.name, description=item.describe(), read_only=item.name in READ_ONLY,
-                                 additional_constraints=item.allowed() if item.choices else "",
+                                 additional_constraints=item.allowed() if item.choices else read_only(item.name),
                                  dynamic_typing=True)  # so that 1 is taken where 1.0 is meant
     if item.type is float:
         result.floating_point_range = [FloatingPointRange(from_value=float(item.low), to_value=float(item.high))]
@@ -106,3 +134,21 @@ def _declare(node, item: Option) -> None:
     parameter = node.declare_parameter(item.name, item.default, ParameterDescriptor(dynamic_typing=True))
     item.convert(parameter.value)
     node.set_descriptor(item.name, descriptor(item))
+
+
+def _check_alone(name: str, value: Any) -> None:
+    if name in READ_ONLY:
+        raise OptionError(f"{name} is {read_only(name)}")
+    OPTIONS[name].convert(value)
+
+
+def read_only(name: str) -> str:
+    """What to do in place of changing a parameter at run time; "" where it can be changed."""
+    return f"read-only while the node runs: {READ_ONLY[name]}" if name in READ_ONLY else ""
+
+
+def _unknown(name: str) -> str:
+    # A section that is nested too deep puts its name in front.
+    near = difflib.get_close_matches(name.rpartition(".")[2].lower(), OPTIONS, n=1)
+    remedy = f"did you mean {near[0]!r}?" if near else "planner --help lists the parameters"
+    return f"Unknown parameter {name!r} is ignored; {remedy}"

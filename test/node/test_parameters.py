@@ -1,6 +1,10 @@
-"""Parameters: declared from the dataclasses, checked one by one and together."""
+"""Parameters: declared from the dataclasses, checked one by one and together, and told of where they are of no effect."""
 
+import array
+import json
 import math
+from contextlib import ExitStack
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -8,17 +12,20 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 import rclpy
+import yaml
 from rclpy.parameter import Parameter
 
-from dubins_rrt_ros.node.parameters import OPTIONS, READ_ONLY, Parameters
+from dubins_rrt_ros.node.parameter_files import WIDTH, as_yaml, unused_files
+from dubins_rrt_ros.node.parameters import OPTIONS, READ_ONLY, Parameters, configuration
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
 
 CONTRACT = {
     "map_file", "global_frame", "planner", "turning_radius", "wheelbase", "max_steering_angle", "robot_radius",
     "allow_unknown", "samples", "planning_time", "goal_bias", "step_size", "heading_sampling", "goal_tolerance_xy",
     "goal_tolerance_yaw", "any_goal_heading", "path_spacing", "seed", "publish_tree", "map_transient_local",
-    "max_map_cells",
+    "max_map_cells", "replan_on_map_change",
 }
+CONFIG = Path(__file__).parents[2] / "config" / "planner.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +49,24 @@ def declared(context):
     yield declare
     for node in nodes:
         node.destroy_node()
+
+
+@pytest.fixture
+def started():
+    """A function that starts a node with these ROS arguments and ends the one before."""
+    running = ExitStack()
+
+    def start(*arguments):
+        running.close()
+        context = rclpy.Context()
+        rclpy.init(args=["planner", "--ros-args", *map(str, arguments)], context=context)
+        running.callback(context.try_shutdown)
+        node = rclpy.create_node("planner", context=context)
+        running.callback(node.destroy_node)
+        return node
+
+    yield start
+    running.close()
 
 
 def change(declared, **values):
@@ -127,8 +152,15 @@ def test_values_that_belong_together_are_taken_together_at_run_time(declared):
     node = declared()
     half = change(node, wheelbase=2.0)
     assert not half.successful and "set both" in half.reason
+    assert half.reason.endswith("change what belongs together in one call of /holder/set_parameters_atomically")
     assert change(node, wheelbase=2.0, max_steering_angle=0.5).successful
     assert node.parameters.read().vehicle.turning_radius == pytest.approx(2.0 / math.tan(0.5))
+
+
+def test_what_was_changed_together_and_does_not_fit_is_not_told_to_change_together(declared):
+    result = change(declared(), wheelbase=2.0, max_steering_angle=0.0)
+    assert not result.successful
+    assert "set_parameters_atomically" not in result.reason
 
 
 def test_a_change_is_taken_whole_or_not_at_all(declared):
@@ -143,6 +175,107 @@ def test_what_shapes_the_topics_cannot_change_at_run_time(declared, name):
     result = change(node, **{name: node.node.get_parameter(name).value})
     assert not result.successful
     assert "read-only" in result.reason
+    reason = node.parameters.check([Parameter(name, value="x")]).reason
+    assert reason.startswith(f"{name} is read-only while the node runs: ")
+    assert "start the node again" in reason
+    assert ("~/load_map" in reason) == (name == "map_file")
+
+
+@pytest.mark.parametrize("name", sorted(OPTIONS))
+def test_every_value_of_another_type_is_refused_in_one_line(declared, name):
+    kind, node = OPTIONS[name].type, declared()
+    for value in [None, [], [b"a"], [True], [1, 2], [0.5], ["two\nlines"], array.array("q", [1]), "two\nlines", True, 7, 0.5]:
+        if type(value) is kind or (type(value), kind) == (int, float):
+            continue
+        with pytest.raises(OptionError) as refusal:
+            declared(**{name: value})
+        for message in (str(refusal.value), node.parameters.check([Parameter(name, value=value)]).reason):
+            assert message.startswith(f"{name} is ")
+            assert message.isprintable()
+
+
+@pytest.mark.parametrize(("argument", "found"), [
+    ("samples:=[1, 2]", "[1, 2]"), ("map_file:=[a]", "['a']"), ("planner:=''", "''"), ("allow_unknown:=1", "1"),
+    ("seed:=[]", "None"), ("turning_radius:=[0.5]", "[0.5]"), ("goal_bias:=[true]", "[True]"), ("global_frame:=''", "''")])
+def test_a_wrong_value_on_the_command_line_is_refused(started, argument, found):
+    with pytest.raises(OptionError) as refusal:
+        Parameters(started("-p", argument))
+    assert str(refusal.value).startswith(f"{argument.partition(':=')[0]} is {found}; ")
+
+
+@pytest.mark.parametrize(("name", "remedy"), [
+    ("turn_radius", "did you mean 'turning_radius'?"), ("Planning_Time", "did you mean 'planning_time'?"),
+    ("planner.ros__parameters.samples", "did you mean 'samples'?"), ("xyz", "planner --help lists the parameters")])
+def test_a_parameter_that_there_is_not_gets_a_warning(started, name, remedy):
+    node = started("-p", f"{name}:=1", "-p", "samples:=10", "-p", "use_sim_time:=true",
+                   "-p", "start_type_description_service:=false", "-p", "qos_overrides./plan.publisher.depth:=2")
+    assert Parameters(node).unknown() == [f"Unknown parameter {name!r} is ignored; {remedy}"]
+
+
+def test_a_parameter_that_another_part_of_the_node_declares_is_known(started):
+    node = started("-p", "other:=1")
+    parameters = Parameters(node)
+    node.declare_parameter("other", 0)
+    assert parameters.unknown() == []
+
+
+SAMPLES = {"ros__parameters": {"samples": 10}}
+
+
+@pytest.mark.parametrize("namespace", ["", "/ns", "/ns/deep"])
+def test_a_file_is_warned_of_exactly_where_ros_takes_nothing_from_it(started, tmp_path, namespace):
+    file = tmp_path / "parameters.yaml"
+    names = ["/**", "/*", "**", "*", "/**/planner", "/*/planner", "*/planner", "planner", "/planner", "/planner/**", "ns/planner",
+             "/ns/planner", "/ns/*", "/ns/**", "/*/*", "/**/ns/**", "/ns/*/planner", "ns", "/other", "planner2", "a_planner"]
+    nested = [{"ns": {"planner": SAMPLES}}, {"/ns/": {"deep": {"*": SAMPLES}}}, {"other": SAMPLES, "/ns": {"**": SAMPLES}}]
+    for sections in (*({name: SAMPLES} for name in names), *nested):
+        file.write_text(json.dumps(sections))
+        node = started("-r", f"__ns:={namespace or '/'}", "--params-file", file)
+        is_used = Parameters(node).read().settings.samples == 10
+        warnings = unused_files(["planner", "--ros-args", "--params-file", str(file)], node.get_fully_qualified_name())
+        assert len(warnings) == (0 if is_used else 1), sections
+
+
+def test_the_warning_of_a_file_has_the_names_that_it_has(tmp_path):
+    file, empty, fine = (tmp_path / name for name in ("other.yaml", "empty.yaml", "fine.yaml"))
+    file.write_text(json.dumps({"ns": {"planner": SAMPLES}, "other": SAMPLES}))
+    empty.write_text("")
+    fine.write_text(json.dumps({"planner": SAMPLES}))
+    arguments = ["planner", "--params-file", "no.yaml", "--ros-args", "-p", "a:=1", "--params-file", str(file), "--params-file",
+                 str(fine), "--", "--params-file", "no.yaml", "--ros-args", "--params-file", str(empty), "--params-file"]
+    assert unused_files(arguments, "/planner") == [
+        f"Parameter file '{file}' is ignored, as it names /ns/planner, /other; name /planner or /** in it",
+        f"Parameter file '{empty}' is ignored, as it has no ros__parameters; name /planner or /** in it"]
+
+
+@pytest.mark.parametrize("content", [None, b"\xff", b"a: [", b"&a {b: *a}"])
+def test_a_file_that_cannot_be_read_gives_no_warning(tmp_path, content):
+    if content is not None:
+        (tmp_path / "p.yaml").write_bytes(content)
+    assert unused_files(["--ros-args", "--params-file", str(tmp_path / "p.yaml")], "/planner") == []
+
+
+def test_the_parameter_file_of_the_package_is_the_one_that_is_printed():
+    assert CONFIG.read_text("utf-8") == as_yaml()
+    assert max(map(len, as_yaml().splitlines())) <= WIDTH
+
+
+def test_the_parameter_file_holds_every_default_and_says_what_each_is():
+    values = yaml.safe_load(as_yaml())["/**"]["ros__parameters"]
+    assert values == {item.name: item.default for item in OPTIONS.values()}
+    assert all(type(values[item.name]) is item.type for item in OPTIONS.values())
+    assert configuration(values) == configuration({item.name: item.default for item in OPTIONS.values()})
+    text = " ".join(line.strip("# ") for line in as_yaml().splitlines())
+    assert all(item.describe() in text for item in OPTIONS.values())
+
+
+@pytest.mark.parametrize("namespace", ["/", "/ns"])
+def test_a_node_takes_the_parameter_file_and_has_the_defaults(started, declared, namespace):
+    node = started("-r", f"__ns:={namespace}", "--params-file", CONFIG)
+    parameters = Parameters(node)
+    assert parameters.read() == declared().parameters.read()
+    assert parameters.unknown() == []
+    assert unused_files(["--ros-args", "--params-file", str(CONFIG)], node.get_fully_qualified_name()) == []
 
 
 def test_a_parameter_of_somebody_else_is_none_of_our_business(declared):

@@ -1,0 +1,55 @@
+"""Poses in the global frame, by tf2 where it is installed."""
+
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from rclpy.node import Node
+from rclpy.time import Time
+
+from dubins_rrt_ros.planning import InvalidPose, Status
+from dubins_rrt_ros.planning.problem import Pose
+
+from .conversions import bare_pose, pose_from, transformed
+from .request import Refusal
+
+try:
+    import tf2_ros
+except ImportError:  # it comes with an installation of ROS, not with pip
+    tf2_ros = None
+
+
+class Frames:
+    """Takes stamped poses to the global frame, by the latest transform."""
+
+    def __init__(self, node: Node, frame: str):
+        self._logger = node.get_logger()
+        self._frame = frame
+        if tf2_ros is not None:
+            self._buffer = tf2_ros.Buffer()
+            self._listener = tf2_ros.TransformListener(self._buffer, node)
+
+    def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped) -> Pose:
+        """The (x, y, yaw) of a message's pose in the global frame.
+
+        Raises:
+            Refusal: it cannot be transformed, or is no pose; `name` is in the message.
+        """
+        pose, frame = bare_pose(message), message.header.frame_id
+        if not frame:
+            self._logger.warning(f"A {name} pose without frame_id is taken to be in '{self._frame}'", once=True)
+        elif frame != self._frame:
+            pose = transformed(pose, self._latest(name, frame))
+        try:
+            return pose_from(name, pose)
+        except InvalidPose as error:
+            raise Refusal(Status.INVALID_POSE, str(error)) from None
+
+    def _latest(self, name: str, frame: str):
+        if tf2_ros is None:
+            raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or")
+        try:
+            return self._buffer.lookup_transform(self._frame, frame, Time()).transform
+        except tf2_ros.TransformException as error:
+            raise self._refusal(name, frame, f"{' '.join(str(error).split()).rstrip('.')}; publish that transform, or") from None
+
+    def _refusal(self, name: str, frame: str, why: str) -> Refusal:
+        return Refusal(Status.TF_ERROR, f"The {name} pose is in frame '{frame}' and cannot be transformed to '{self._frame}': "
+                                        f"{why} publish the pose in '{self._frame}'.")

@@ -1,0 +1,101 @@
+"""The node's process: arguments, signals, exit status."""
+
+import argparse
+import signal
+import sys
+
+import rclpy
+from rclpy.exceptions import NameValidationException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.utilities import remove_ros_args
+
+from dubins_rrt_ros.planning import MapError, OptionError
+
+from .parameter_files import as_yaml, unused_files
+from .parameters import OPTIONS
+from .planner_node import PlannerNode
+
+#: How long a signal may go unnoticed [s].
+SIGNAL_INTERVAL = 0.25
+
+
+class ConfigurationError(Exception):
+    """The node cannot start as it is configured; the message, of one line, names what to change."""
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit status is 1 where its configuration cannot be used."""
+    arguments = sys.argv if args is None else args
+    node = executor = None
+    try:
+        if _parse(arguments).print_parameters:
+            print(as_yaml(), end="")
+            return 0
+        node = _configured_node(arguments)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        _spin(executor, node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass  # SIGINT and SIGTERM are how it ends
+    except ConfigurationError as error:
+        print(f"planner: {error}", file=sys.stderr)
+        return 1
+    except Exception:
+        if rclpy.ok():  # else a signal came while something was published, which then fails
+            raise
+    finally:
+        # A second signal must not break off the end.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        if node is not None:
+            node.close()
+        if executor is not None:
+            executor.shutdown()  # left to the garbage collector, it may come after what it refers to, with a traceback
+        rclpy.try_shutdown()
+    return 0
+
+
+def _spin(executor: SingleThreadedExecutor, node: PlannerNode) -> None:
+    # Not spin(): a signal can come between its look at the context and its wait, which then lasts for ever.
+    while rclpy.ok():
+        try:
+            executor.spin_once(timeout_sec=SIGNAL_INTERVAL)
+        except ExternalShutdownException:
+            raise
+        except Exception as error:  # of any kind: the node lives on
+            if not rclpy.ok():
+                raise
+            node.tell_defect(error)
+
+
+def _configured_node(arguments: list[str]) -> PlannerNode:
+    try:
+        rclpy.init(args=arguments)
+    except RuntimeError as error:  # a ROS argument or a parameter file that cannot be read
+        raise ConfigurationError(_one_line(error)) from error
+    try:
+        node = PlannerNode()
+    except (OptionError, MapError, NameValidationException) as error:
+        raise ConfigurationError(_one_line(error)) from error
+    for warning in unused_files(arguments, node.get_fully_qualified_name()):
+        node.get_logger().warning(warning)
+    return node
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    """The arguments that are not ROS's; prints the help and exits where it is asked for, or where there are others."""
+    lines = [f"  {item.name} (default {item.default!r}): {item.describe()}" for item in OPTIONS.values()]
+    parser = argparse.ArgumentParser(
+        prog="planner", description="Plan Dubins paths from start_pose to each goal_pose on a map, with RRT or RRT*.",
+        usage="%(prog)s [--help] [--print-parameters] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
+        epilog="\n".join(["parameters:", *lines]), formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--print-parameters", action="store_true", help="print a parameter file with all defaults and exit")
+    try:
+        own = remove_ros_args(arguments)[1:]
+    except RuntimeError as error:
+        raise ConfigurationError(_one_line(error)) from error
+    return parser.parse_args(own)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,85 @@
+"""Files that set the node's parameters: one with all of them, and those that are passed over in silence."""
+
+import json
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from dubins_rrt_ros.planning import options
+
+from .parameters import CLASSES, READ_ONLY, read_only
+
+#: The columns of a parameter file that is written.
+WIDTH = 100
+
+
+def as_yaml() -> str:
+    """A parameter file, for a node of any name, of all options with their defaults; what each one takes stands above it."""
+    lines = [*_comment("The planner's parameters with their defaults, as `planner --print-parameters` prints them.", ""),
+             "/**:", "  ros__parameters:"]
+    for cls, title in CLASSES.items():
+        lines += ["", f"    # --- {title} ---"]
+        for item in options(cls):
+            about = item.describe() + (f"; {read_only(item.name)}" if item.name in READ_ONLY else "")
+            # Of YAML's ways to write a value, JSON's are those that nothing takes for another type.
+            lines += ["", *_comment(about, "    "), f"    {item.name}: {json.dumps(item.default)}"]
+    return "\n".join(lines) + "\n"
+
+
+def unused_files(arguments: Sequence[str], node_name: str) -> list[str]:
+    """A warning, of one sentence, for each parameter file that names other nodes only: ROS passes over it in silence.
+
+    Args:
+        arguments: the command line. Its files are read; what cannot be read gives no warning, as ROS refuses it.
+        node_name: the node's full name, such as /planner.
+    """
+    warnings = []
+    for file in _parameter_files(arguments):
+        names = _named_nodes(file)
+        if names is not None and not any(_is_for(name, node_name) for name in names):
+            found = f"names {', '.join(names)}" if names else "has no ros__parameters"
+            warnings.append(f"Parameter file {file!r} is ignored, as it {found}; name {node_name} or /** in it")
+    return warnings
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    start = f"{indent}# "
+    return textwrap.wrap(text, WIDTH, initial_indent=start, subsequent_indent=start, break_long_words=False,
+                         break_on_hyphens=False)
+
+
+def _parameter_files(arguments: Sequence[str]) -> Iterator[str]:
+    is_for_ros = False
+    for argument, following in pairwise((*arguments, "")):
+        if argument in ("--ros-args", "--"):
+            is_for_ros = argument == "--ros-args"
+        elif is_for_ros and argument == "--params-file":
+            yield following
+
+
+def _named_nodes(file: str) -> list[str] | None:
+    """The nodes that a parameter file has a section for, by their full names or wildcards; None where it cannot be read."""
+    try:
+        return list(_sections(yaml.load(Path(file).read_text("utf-8"), Loader=yaml.BaseLoader)))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        return None
+
+
+def _sections(tree: Any, name: str = "") -> Iterator[str]:
+    for key, value in tree.items() if isinstance(tree, dict) else ():
+        if key == "ros__parameters":
+            yield name
+        else:
+            yield from _sections(value, "/".join([name, *filter(None, key.split("/"))]))
+
+
+def _is_for(section: str, node_name: str) -> bool:
+    """Whether a section applies to a node, as rcl and rclpy see it: `*` is any one name, `**` any number of them."""
+    wildcards = {"*": r"/\w+", "**": r"(/\w+)*"}
+    pattern = "".join(wildcards.get(part, f"/{re.escape(part)}") for part in section.split("/")[1:])
+    return re.fullmatch(pattern, node_name) is not None

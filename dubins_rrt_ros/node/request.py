@@ -1,0 +1,82 @@
+"""A request to the planner, as a job for a worker. It knows nothing of ROS."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, plan
+
+#: Improvements of a path are reported at most once in this time [s].
+IMPROVEMENT_INTERVAL = 0.1
+#: How long a cancellation may go unnoticed while a map is prepared [s].
+PREPARING_INTERVAL = 0.01
+
+
+class Refusal(Exception):
+    """A request that is not planned: the status and the sentence that say why."""
+
+    def __init__(self, status: Status, message: str):
+        super().__init__(message)
+        self.status = status
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What to plan.
+
+    Attributes:
+        id: the plan_id of its answers.
+        problem, settings: what plan() takes.
+        prepared: set once the clearance of the problem's map is computed.
+    """
+
+    id: int
+    problem: Problem
+    settings: Settings
+    prepared: threading.Event
+
+    def serve(self, improved: Callable[[Plan], None], cancelled: Callable[[], bool]) -> Plan:
+        """Plan.
+
+        Args:
+            improved: called with the first path at once, and with improvements at most every IMPROVEMENT_INTERVAL, unless
+                the request is cancelled.
+            cancelled: asked about every 10 ms.
+
+        Raises:
+            Refusal: it was cancelled before it was begun.
+        """
+        self._await_map(cancelled)
+        throttle = _Throttle(IMPROVEMENT_INTERVAL)
+
+        def on_progress(progress: Progress) -> None:
+            if throttle.lets_pass(progress.improved) and not cancelled():
+                snapshot = progress.snapshot()
+                if snapshot.path is not None:
+                    improved(snapshot)
+
+        return plan(self.problem, self.settings, cancel=cancelled, on_progress=on_progress)
+
+    def _await_map(self, cancelled: Callable[[], bool]) -> None:
+        while not self.prepared.wait(PREPARING_INTERVAL) and not cancelled():
+            pass
+        if cancelled():
+            raise Refusal(Status.CANCELLED, "Cancelled before a first path: the planner had not begun yet.")
+
+
+class _Throttle:
+    """Lets the first improvement pass at once and later ones when the interval is over, however long ago they came."""
+
+    def __init__(self, interval: float):
+        self._interval = interval
+        self._due = -float("inf")
+        self._pending = False
+
+    def lets_pass(self, improved: bool) -> bool:
+        self._pending |= improved
+        now = time.monotonic()
+        if not self._pending or now < self._due:
+            return False
+        self._pending, self._due = False, now + self._interval
+        return True
