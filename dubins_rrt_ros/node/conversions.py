@@ -2,6 +2,7 @@
 
 import array
 import math
+import struct
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovariance
 def pose_message(pose: Pose) -> PoseMessage:
     """An (x, y, yaw) as a message, with w >= 0 in its quaternion."""
     message = PoseMessage()
-    _fill(message, *_rows(np.array([pose]))[0])
+    _fill(message, *_rows(np.array([pose]))[0].tolist())
     return message
 
 
@@ -77,10 +78,15 @@ class _Quaternion(NamedTuple):
         return _Quaternion(self.w, -self.x, -self.y, -self.z)
 
 
+def poses_of(plan: Plan | None) -> np.ndarray:
+    """(n, 3) poses of a plan's path at the spacing it asks for, none where there is no path."""
+    return plan.path.poses(plan.settings.path_spacing) if plan is not None and plan.path is not None else np.empty((0, 3))
+
+
 def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
     """(n, 3) poses as a path; without poses it is empty and tells that there is none."""
     message = PathMessage(header=Header(stamp=stamp, frame_id=frame))
-    for row in _rows(poses):
+    for row in _rows(poses).tolist():
         stamped = PoseStamped()
         stamped.header = message.header
         _fill(stamped.pose, *row)
@@ -88,11 +94,27 @@ def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
     return message
 
 
-def _rows(poses: np.ndarray) -> list[list[float]]:
-    """Of each pose x, y and the quaternion's z, w, as Python floats: a numpy number in a field goes out as garbage."""
+def serialized_path(poses: np.ndarray, frame: str, stamp: Time) -> bytes:
+    """`path_message` as it goes over the wire, in CDR: ten thousand poses in 3 ms and not in 100, while nobody is answered."""
+    name = frame.encode() + b"\0"
+    header = struct.pack("<iII", stamp.sec, stamp.nanosec, len(name)) + name
+    begin = header + bytes(-len(header) % 4) + struct.pack("<I", len(poses))
+    numbers = np.zeros((len(poses), 7))
+    numbers[:, [0, 1, 5, 6]] = _rows(poses)
+    # Doubles are aligned to 8 bytes, which the first pose need not begin at; all others do.
+    aligned = header + bytes(-len(header) % 8)
+    others = np.empty((max(0, len(poses) - 1), len(aligned) + 8 * 7), np.uint8)
+    others[:, :len(aligned)] = np.frombuffer(aligned, np.uint8)
+    others[:, len(aligned):] = numbers[1:].view(np.uint8)
+    first = header + bytes(-len(begin + header) % 8) if len(poses) else b""
+    return b"\0\1\0\0" + begin + first + numbers[:1].tobytes() + others.tobytes()
+
+
+def _rows(poses: np.ndarray) -> np.ndarray:
+    """Of each pose x, y and the quaternion's z, w; in a field they must be Python floats: a numpy number goes out as garbage."""
     x, y, yaw = np.asarray(poses, dtype=float).reshape(-1, 3).T
     half = (yaw - 2 * math.pi * np.round(yaw / (2 * math.pi))) / 2
-    return np.stack([x, y, np.sin(half), np.cos(half)], axis=1).tolist()
+    return np.stack([x, y, np.sin(half), np.cos(half)], axis=1)
 
 
 def _fill(message: PoseMessage, x: float, y: float, z: float, w: float) -> None:

@@ -13,7 +13,7 @@ from visualization_msgs.msg import MarkerArray
 
 from dubins_rrt_ros.planning import Plan, Status
 
-from .conversions import path_message, status_message
+from .conversions import path_message, poses_of, serialized_path, status_message
 from .markers import tree_markers
 from .parameters import Parameters
 from .qos import LATCHED
@@ -66,12 +66,11 @@ class Outputs:
 
     def _show_path(self, plan: Plan | None) -> None:
         self.shown = plan
-        self._path.publish(self.path(plan))
+        self._path.publish(serialized_path(poses_of(plan), self._frame, self._now()))
 
     def path(self, plan: Plan | None) -> PathMessage:
         """The path of a plan as a message, empty where there is none."""
-        poses = plan.path.poses(plan.settings.path_spacing) if plan is not None and plan.path is not None else ()
-        return path_message(poses, self._frame, self._now())
+        return path_message(poses_of(plan), self._frame, self._now())
 
     def tell(self, status: Status, message: str, plan: Plan | None = None, *, last: bool = True, plan_id: int = 0,
              revision: int = 0, map_id: str = "") -> None:
