@@ -58,7 +58,7 @@ def audit(path: Path, problem: Problem) -> Audit:
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = _drive(path)
     findings = [*_end_findings(path, problem), *_joint_findings(path, starts, ends), *_turn_findings(path, problem)]
-    obstacles = _obstacles_of(problem)
+    obstacles = _obstacles_of(problem.map, problem.allow_unknown)
     need = max(problem.vehicle.robot_radius, POINT)
     least, where, decided = _least_clearance(arcs, obstacles, need)
     if not decided:
@@ -173,12 +173,17 @@ class _Obstacles:
         return np.where(shapely.contains_xy(self._inside, x, y), distance, 0.0)
 
 
-def _obstacles_of(problem: Problem) -> _Obstacles:
-    by_unknown = _judges.setdefault(problem.map, {})
-    if problem.allow_unknown not in by_unknown:
-        by_unknown[problem.allow_unknown] = (_grid_obstacles(problem.map, problem.allow_unknown)
-                                             if isinstance(problem.map, GridMap) else _Obstacles(problem.map.free, np.array([])))
-    return by_unknown[problem.allow_unknown]
+def prepare_audit(map: Map, allow_unknown: bool) -> None:
+    """Compute what depends on the map alone, so that no audit need wait for it: it is kept as long as the map."""
+    _obstacles_of(map, allow_unknown)
+
+
+def _obstacles_of(map: Map, allow_unknown: bool) -> _Obstacles:
+    by_unknown = _judges.setdefault(map, {})
+    if allow_unknown not in by_unknown:
+        by_unknown[allow_unknown] = (_grid_obstacles(map, allow_unknown) if isinstance(map, GridMap)
+                                     else _Obstacles(map.free, np.array([])))
+    return by_unknown[allow_unknown]
 
 
 def _grid_obstacles(grid: GridMap, allow_unknown: bool) -> _Obstacles:

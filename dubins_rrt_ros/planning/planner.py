@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import reasons
-from .audit import audit
+from .audit import audit, prepare_audit
 from .bounds import lower_bound
 from .clearance import ClearanceField
 from .map import Map
@@ -31,6 +31,7 @@ LEAST_IMPROVEMENT = 1e-6
 def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False) -> None:
     """Compute what depends on map and vehicle alone, so that requests need not wait for it: it is kept as long as the map."""
     ClearanceField.of(map, allow_unknown).components(vehicle.robot_radius)
+    prepare_audit(map, allow_unknown)
 
 
 def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = lambda: False,
