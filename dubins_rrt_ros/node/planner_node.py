@@ -166,6 +166,7 @@ class PlannerNode(Node):
     def _begin(self, goal: PoseStamped) -> None:
         """From now on this goal counts alone."""
         self._goal_worker.cancel()
+        self._is_planning = False
         self._goal = goal
         self._goal_id = self._next_id()
         self._revision = 0
@@ -274,15 +275,16 @@ class PlannerNode(Node):
             raise Refusal(Status.INVALID_POSE, f"The tolerance of the request cannot be used: {error}") from None
 
     async def _on_cancel(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = True
+        messages = []
         if not self._grace.is_canceled():
             self._grace.cancel()
-            self._answer(Status.CANCELLED, "Cancelled while the goal waited for a start.")
+            messages.append("Cancelled before a first path: the goal waited for a start.")
+            self._answer(Status.CANCELLED, messages[0])
         ends = list(self._ends.values())
         self._goal_worker.cancel()
         self._service_worker.cancel()
-        messages = [(await end)[1] for end in ends]
-        response.message = " ".join(messages) or "Nothing is being planned."
+        messages += [(await end)[1] for end in ends]
+        response.success, response.message = True, " ".join(messages) or "Nothing is being planned."
         return response
 
     # Failures
