@@ -16,7 +16,7 @@ from dubins_rrt_ros.share import find_map
 
 from .conversions import as_grid, grid_from, grid_message
 from .mailbox import Mailbox
-from .parameters import Configuration, Parameters
+from .parameters import Configuration, NodeOptions, Parameters
 from .qos import LATCHED, VOLATILE, misfits
 from .worker import Worker
 
@@ -41,18 +41,20 @@ class Maps:
 
     Args:
         node, parameters, mailbox: the node's.
-        on_news: called in the executor's thread when a map was taken or refused, and when one is prepared.
+        on_news: called in the executor's thread when a map was taken or refused.
+        on_prepared: called there when the newest is prepared.
 
     Raises:
         MapError: the parameter map_file names no map that can be used.
     """
 
-    def __init__(self, node: Node, parameters: Parameters, mailbox: Mailbox, on_news: Callable[[], None]):
+    def __init__(self, node: Node, parameters: Parameters, mailbox: Mailbox, on_news: Callable[[], None],
+                 on_prepared: Callable[[], None]):
         self._node = node
         self._parameters = parameters
         self._mailbox = mailbox
-        self._on_news = on_news
-        self._options = parameters.read().node
+        self._on_news, self._tell_prepared = on_news, on_prepared
+        self._frame = self._options.global_frame
         self._refused = ""  # why the last one was refused
         self.worker = Worker("maps")
         self.current: MapInUse | None = None
@@ -65,6 +67,10 @@ class Maps:
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
         node.create_service(LoadMap, "~/load_map", self._on_load_map, callback_group=ReentrantCallbackGroup())
         node.create_service(GetMap, "~/get_map", self._on_get_map)
+
+    @property
+    def _options(self) -> NodeOptions:
+        return self._parameters.read().node
 
     @property
     def id(self) -> str:
@@ -85,7 +91,7 @@ class Maps:
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
-            grid = grid_from(message, self._options.global_frame, self._options.max_map_cells)
+            grid = grid_from(message, self._frame, self._options.max_map_cells)
         except MapError as error:
             self._refuse(error)
         else:
@@ -121,7 +127,7 @@ class Maps:
             raise outcome
         if outcome is self.current:
             self._node.get_logger().info(f"The map is ready, id {outcome.map.id}")
-            self._mailbox.post(self._on_news)
+            self._tell_prepared()
 
     def _post(self, receiver: Callable, outcome: object) -> None:
         self._mailbox.post(partial(receiver, outcome))
@@ -143,13 +149,13 @@ class Maps:
     def _on_get_map(self, request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
         if self.current is None:
             self._node.get_logger().warning(f"get_map gives an empty map: {self.missing()}")
-            response.map.header.frame_id = self._options.global_frame
+            response.map.header.frame_id = self._frame
         else:
             response.map = self._message(self.current.grid)
         return response
 
     def _message(self, grid: GridMap) -> OccupancyGrid:
-        return grid_message(grid, self._options.global_frame, self._node.get_clock().now().to_msg())
+        return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
 
 
 def _result(outcome: object) -> int:

@@ -35,7 +35,7 @@ START_GRACE = 0.5
 #: How often it is said what is waited for [s].
 WAITING_INTERVAL = 5.0
 #: The time that the workers get to heed their cancellation at shutdown [s].
-SHUTDOWN_TIMEOUT = 0.5
+SHUTDOWN_TIMEOUT = 0.2
 
 
 class PlannerNode(Node):
@@ -71,7 +71,7 @@ class PlannerNode(Node):
         self._goal_worker, self._service_worker = Worker("goals"), Worker("services")
         self._grace = self._steady_timer(START_GRACE, self._plan)
         self._grace.cancel()
-        self._maps = Maps(self, self._configured, self._mailbox, self._on_map_news)
+        self._maps = Maps(self, self._configured, self._mailbox, self._note_waiting, self._check_shown_path)
         self._steady_timer(WAITING_INTERVAL, self._keep_explaining)
         self._note_waiting()
         self._listen()
@@ -97,16 +97,10 @@ class PlannerNode(Node):
         """End the workers; nothing is published afterwards."""
         self._mailbox.close()
         until = time.monotonic() + SHUTDOWN_TIMEOUT
-        workers = (self._goal_worker, self._service_worker, self._maps.worker)
-        ended = [worker.close(max(0.0, until - time.monotonic())) for worker in workers]
-        if not all(ended):
-            self.get_logger().warning(f"A computation did not stop within {SHUTDOWN_TIMEOUT} s of its cancellation")
+        for worker in (self._goal_worker, self._service_worker, self._maps.worker):
+            worker.close(max(0.0, until - time.monotonic()))  # who does not end in time, such as a preparation, ends with us
 
     # What is waited for
-
-    def _on_map_news(self) -> None:
-        self._note_waiting()
-        self._check_shown_path()
 
     def _keep_explaining(self) -> None:
         if not self._note_waiting():
@@ -120,8 +114,9 @@ class PlannerNode(Node):
         self._log_waiting()
         if self._maps.current is None:
             self._outputs.tell(Status.NO_MAP, self._waiting_for, last=False)
-        elif self._waiting_for and self._outputs.status is Status.NO_MAP:
-            self._outputs.tell(Status.NO_START, self._waiting_for, last=False, map_id=self._maps.id)
+        elif self._outputs.status is Status.NO_MAP:
+            status = Status.NO_START if self._waiting_for else Status.NONE
+            self._outputs.tell(status, self._waiting_for or "Ready for a goal.", last=False, map_id=self._maps.id)
         return True
 
     def _log_waiting(self) -> None:
@@ -185,23 +180,24 @@ class PlannerNode(Node):
                 raise Refusal(Status.NO_START, f"A goal came before any start: {self._no_start()}")
             request = self._request(self._goal_id, self._start, self._frames.pose("goal", self._goal))
             self._is_planning = True
-            self._submit(self._goal_worker, request, self._end_goal)
+            self._submit(self._goal_worker, request, self._end_goal, self._improve_goal)
 
     def _request(self, plan_id: int, start: Pose, goal: Pose, **wanted: Any) -> Request:
         now, used = self._configured.read(), self._maps.current
         problem = Problem(used.map, now.vehicle, start, goal, **{**now.problem, **wanted})
         return Request(plan_id, problem, now.settings, used.prepared)
 
-    def _submit(self, worker: Worker, request: Request, ended: Callable) -> Future:
+    def _submit(self, worker: Worker, request: Request, ended: Callable, improved: Callable | None = None) -> Future:
         """Have a request served; the future's result, which `ended` is called with too, says how it ended."""
         self._ends[request.id] = end = Future()
-        job = partial(request.serve, lambda plan: self._mailbox.post(partial(self._on_improved, request.id, plan)))
-        worker.submit(job, lambda outcome: self._mailbox.post(partial(self._on_end, request.id, ended, outcome)))
+        report = improved and (lambda plan: self._mailbox.post(partial(improved, request.id, plan)))
+        worker.submit(partial(request.serve, report),
+                      lambda outcome: self._mailbox.post(partial(self._on_end, request.id, ended, outcome)))
         return end
 
     # How requests are answered
 
-    def _on_improved(self, plan_id: int, plan: Plan) -> None:
+    def _improve_goal(self, plan_id: int, plan: Plan) -> None:
         if plan_id == self._goal_id:
             with self._telling_failures(self._answer):
                 self._answer(plan.status, plan.message, plan, last=False)

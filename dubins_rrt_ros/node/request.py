@@ -36,12 +36,12 @@ class Request:
     settings: Settings
     prepared: threading.Event
 
-    def serve(self, improved: Callable[[Plan], None], cancelled: Callable[[], bool]) -> Plan:
+    def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
         """Plan.
 
         Args:
             improved: called with the first path at once, and with improvements at most every IMPROVEMENT_INTERVAL, unless
-                the request is cancelled.
+                the request is cancelled; None where nobody waits for them.
             cancelled: asked about every 10 ms.
 
         Raises:
@@ -51,7 +51,7 @@ class Request:
         throttle = _Throttle(IMPROVEMENT_INTERVAL)
 
         def on_progress(progress: Progress) -> None:
-            if throttle.lets_pass(progress.improved) and not cancelled():
+            if improved and throttle.lets_pass(progress.improved) and not cancelled():
                 snapshot = progress.snapshot()
                 if snapshot.path is not None:
                     improved(snapshot)

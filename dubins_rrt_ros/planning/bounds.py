@@ -18,6 +18,8 @@ Point = tuple[float, float]
 
 #: Less is rounding [m].
 ROUNDING = 1e-9
+#: What is farther away is taken to be here, that its square be a number [m].
+FAR = 1e100
 #: The widest way is sought on a lattice of at most about this many nodes ...
 MOST_NODES = 1_000_000 if COMPILED else 50_000
 #: ... and through unknown space on a grid of at most about this many cells.
@@ -64,7 +66,7 @@ def lower_bound(problem: Problem) -> float:
 def nearest_in_map(map: Map, point: Point) -> Point:
     """The point of the map's rectangle that is nearest to `point`: itself where it is inside."""
     corner, sides = _rectangle(map)
-    share = (np.array(point) - corner) @ sides.T / (sides**2).sum(axis=1)
+    share = (np.clip(point, -FAR, FAR) - corner) @ sides.T / (sides**2).sum(axis=1)
     if ((share >= 0) & (share <= 1)).all():
         return point
     return tuple((corner + share.clip(0, 1) @ sides).tolist())

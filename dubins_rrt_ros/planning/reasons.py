@@ -233,7 +233,9 @@ def _at(point: Point) -> str:
 
 
 def _metres(value: float) -> str:
-    """Two decimals, or two significant digits where that is more."""
+    """Two decimals, or two significant digits where that is more; of what is too far to imagine three."""
+    if value >= 1e7:
+        return f"{value:.3g}"
     return f"{value:.2f}" if value >= 0.1 or value == 0 else f"{value:.2g}"
 
 

@@ -1,11 +1,15 @@
 """The planner as a process of its own, and its clients: what the tests of the node stand on."""
 
+import math
 import os
 import signal
 import subprocess
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
+
+import numpy as np
 
 DEADLINE = 20.0
 
@@ -13,12 +17,12 @@ DEADLINE = 20.0
 class NodeProcess:
     """The installed planner as a process of its own."""
 
-    def __init__(self, namespace: str, arguments: list[str]):
+    def __init__(self, namespace: str, arguments: list[str], command: list[str] | None = None):
         from dubins_rrt_ros.share import planner_command
 
         self.name = f"{namespace}/planner"
         self._process = subprocess.Popen(
-            [*planner_command(), "--ros-args", "-r", f"__ns:={namespace}", *arguments], text=True,
+            [*(command or planner_command()), "--ros-args", "-r", f"__ns:={namespace}", *arguments], text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "PYTHONUNBUFFERED": "1"})
         self._lines: list[str] = []
         self._heard = threading.Condition()
@@ -51,10 +55,13 @@ class NodeProcess:
         self._reader.join(DEADLINE)
         return status
 
-    def end(self, by: signal.Signals) -> tuple[int, float]:
-        """Its exit status after a signal, and how long it took [s]."""
+    def end(self, by: signal.Signals, again_after: float | None = None) -> tuple[int, float]:
+        """Its exit status after a signal, or two of them, and how long it took [s]."""
         begin = time.monotonic()
         self._process.send_signal(by)
+        if again_after is not None:
+            time.sleep(again_after)
+            self._process.send_signal(by)
         return self.wait(), time.monotonic() - begin
 
     def kill(self) -> None:
@@ -125,6 +132,18 @@ class Client:
             self._executor.spin_once(timeout_sec=0.05)
         return value
 
+    def spin_once(self) -> None:
+        """Hear what has come, for a millisecond at most where nothing has."""
+        self._executor.spin_once(timeout_sec=0.001)
+
+    def spin_until_done(self, future, timeout: float) -> None:
+        """Until a future is done, or the time is over [s]."""
+        self._executor.spin_until_future_complete(future, timeout)
+
+    def wait_for_word(self, word: str) -> None:
+        """Until the planner has logged this; its log comes through a pipe, and may be later than its messages."""
+        self.wait_for(lambda: word in self._process.output, f"{word!r} in the log")
+
     def send(self, topic: str, pose, frame: str = "map") -> None:
         """Publish (x, y, yaw) or a geometry_msgs/Pose on a pose topic."""
         from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -166,15 +185,32 @@ class Client:
 
     def call(self, kind, name: str, **fields):
         """Call a service of the planner and wait for its response."""
-        future = self.request(kind, name, **fields)
-        return self.wait_for(lambda: future.done() and future.result(), f"an answer of {name}")
+        return self.response(self.request(kind, name, **fields))
+
+    def response(self, future):
+        """Wait for what a service answers."""
+        return self.wait_for(lambda: future.done() and future.result(), "an answer of a service")
 
     def request_plan(self, start, goal, tolerance: float = 0.0, frame: str = "map"):
-        """Ask get_plan for a path between two (x, y, yaw) or geometry_msgs/Pose; a future with its response."""
+        """Ask get_plan for a path between two (x, y, yaw), geometry_msgs/Pose or PoseStamped; a future with its response."""
         from nav_msgs.srv import GetPlan
 
         return self.request(GetPlan, "get_plan", start=_stamped(start, frame), goal=_stamped(goal, frame),
                             tolerance=tolerance)
+
+    def plan(self, start, goal, **more):
+        """Ask get_plan and wait: the path, and the request's status as by `status_of`."""
+        plan_id = self.next_id
+        path = self.response(self.request_plan(start, goal, **more)).plan
+        return path, self.status_of(plan_id)
+
+    def begin_plan(self, start, goal):
+        """Ask get_plan; a future with its response, of a request that has come in before whatever is asked next."""
+        from nav_msgs.srv import GetMap
+
+        future = self.request_plan(start, goal)
+        self.call(GetMap, "get_map")
+        return future
 
     def set_parameters(self, **values):
         """Set parameters of the planner all at once; the rcl_interfaces/SetParametersResult."""
@@ -188,16 +224,75 @@ class Client:
         """The values, `level` and `message` of the next status of a request that has the wanted values."""
         def find():
             for status in self.statuses:
-                values = {item.key: item.value for item in status.values}
+                values = values_of(status)
                 if values["plan_id"] == str(plan_id) and wanted.items() <= values.items():
                     return values | {"level": status.level, "message": status.message, "name": status.name}
             return None
         return self.wait_for(find, f"a status of request {plan_id} with {wanted}")
 
+    @property
+    def next_id(self) -> int:
+        """The plan_id of the next request, where the last one has been answered."""
+        return 1 + max((int(values_of(status)["plan_id"]) for status in self.statuses), default=0)
+
     def close(self) -> None:
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
+
+
+class Conversation:
+    """Requests to one planner, one after the other, by a client that sends all of them.
+
+    Attributes:
+        asked: the plan_id of the newest request.
+    """
+
+    def __init__(self, process: NodeProcess, client: Client):
+        self.process, self.client = process, client
+        self.asked = 0
+
+    def start(self, pose, topic: str = "start_pose") -> None:
+        """Send a start that the next goal finds, though topics keep no common order: without any, a goal waits for it."""
+        from geometry_msgs.msg import Point, Pose
+
+        self.refused_start(Pose(position=Point(x=math.nan)))
+        self.client.send(topic, pose)
+
+    def refused_start(self, pose, frame: str = "map", topic: str = "start_pose") -> dict[str, str]:
+        """The status after a start that cannot be used; the planner knows none then."""
+        self.client.statuses.clear()
+        self.client.send(topic, pose, frame)
+        return self.client.status_of(0)
+
+    def goal(self, pose, frame: str = "map", **wanted: str) -> dict[str, str]:
+        """The status of a goal, the first that has the wanted values."""
+        self.asked += 1
+        self.client.statuses.clear()
+        self.client.send("goal_pose", pose, frame)
+        return self.client.status_of(self.asked, **wanted)
+
+    def plan(self, start, goal, **more) -> tuple[dict[str, str], list]:
+        """The status of a request to get_plan, and the poses of its response."""
+        self.asked += 1
+        self.client.statuses.clear()
+        future = self.client.request_plan(start, goal, **more)
+        response = self.client.wait_for(lambda: future.done() and future.result(), "a plan")
+        return self.client.status_of(self.asked), response.plan.poses
+
+
+    @contextmanager
+    def going_on(self, start, goal, map_id: str):
+        """Whatever is done within, a good goal is answered after it, on this map, and nothing was a defect."""
+        said = len(self.process.output)
+        yield
+        self.start(start)
+        told = self.goal(goal)
+        assert (told["error_name"], told["map_id"]) == ("NONE", map_id)
+        assert self.process.running
+        log = self.process.output[said:]
+        assert "Traceback" not in log
+        assert "Warning" not in log, "numpy warns"
 
 
 class Planners:
@@ -209,16 +304,17 @@ class Planners:
         self._processes: list[NodeProcess] = []
         self._clients: list[Client] = []
 
-    def start(self, *arguments: str, **parameters) -> NodeProcess:
-        """The planner with these parameters, in a namespace of its own."""
+    def start(self, *arguments: str, command: list[str] | None = None, **parameters) -> NodeProcess:
+        """The planner, or another command that is one, with these parameters, in a namespace of its own."""
         Planners._count += 1
-        self._namespace = f"/test{Planners._count}"
-        return self.restart(*arguments, **parameters)
+        # With the process' number, as another run of the tests may be in the same domain.
+        self._namespace = f"/test{os.getpid()}_{Planners._count}"
+        return self.restart(*arguments, command=command, **parameters)
 
-    def restart(self, *arguments: str, **parameters) -> NodeProcess:
+    def restart(self, *arguments: str, command: list[str] | None = None, **parameters) -> NodeProcess:
         """Another planner in the namespace of the last."""
         rules = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_yaml(value)}")]
-        self._processes.append(NodeProcess(self._namespace, [*rules, *arguments]))
+        self._processes.append(NodeProcess(self._namespace, [*rules, *arguments], command))
         return self._processes[-1]
 
     def client(self, listens_to_tree: bool = False) -> Client:
@@ -240,11 +336,40 @@ class Planners:
                 process.kill()
 
 
+def assert_says(told: dict[str, str], code: str, name: str, *words: str) -> None:
+    """A status has the code and its name, and all the words in its sentence."""
+    assert (told["error_code"], told["error_name"]) == (code, name), told["message"]
+    assert [word for word in words if word not in told["message"]] == [], told["message"]
+
+
+def values_of(status) -> dict[str, str]:
+    """The values of a status by key."""
+    return {item.key: item.value for item in status.values}
+
+
+def poses_of(path) -> np.ndarray:
+    """(n, 3) x [m], y [m], yaw [rad] of a path message."""
+    return np.array([(p.pose.position.x, p.pose.position.y, 2 * math.atan2(p.pose.orientation.z, p.pose.orientation.w))
+                     for p in path.poses]).reshape(-1, 3)
+
+
+def occupancy(cells: np.ndarray, frame: str = "map"):
+    """A map message with these values, in cells of 0.1 m from (0, 0) on."""
+    from builtin_interfaces.msg import Time
+
+    from dubins_rrt_ros.node.conversions import grid_message
+    from dubins_rrt_ros.planning import GridMap
+
+    return grid_message(GridMap(cells, 0.1), frame, Time())
+
+
 def _stamped(pose, frame: str):
     from geometry_msgs.msg import Pose, PoseStamped
 
     from dubins_rrt_ros.node.conversions import pose_message
 
+    if isinstance(pose, PoseStamped):
+        return pose
     message = PoseStamped(pose=pose if isinstance(pose, Pose) else pose_message(pose))
     message.header.frame_id = frame
     return message

@@ -11,20 +11,23 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 import shapely
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion, Transform, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
+from scipy.spatial.transform import Rotation
 
 from dubins_rrt_ros.node.conversions import (
     RASTER_CELLS,
     as_grid,
+    bare_pose,
     grid_from,
     grid_message,
     path_message,
     pose_from,
     pose_message,
     status_message,
+    transformed,
 )
 from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, PolygonMap, Status
 
@@ -65,6 +68,55 @@ def test_a_pose_with_covariance_is_a_pose(over_the_wire):
     message = PoseWithCovarianceStamped()
     message.pose.pose = pose_message((1.0, 2.0, 0.5))
     assert pose_from("start", over_the_wire(message)) == pytest.approx((1.0, 2.0, 0.5), abs=1e-15)
+
+
+def test_the_bare_pose_is_the_one_in_every_kind_of_message(over_the_wire):
+    pose = stamped(x=3.0, q=(0.0, 0.0, 0.6, 0.8)).pose
+    with_covariance = PoseWithCovarianceStamped()
+    with_covariance.pose.pose = pose
+    for message in (pose, PoseStamped(pose=pose), with_covariance):
+        assert bare_pose(over_the_wire(message)) == pose
+
+
+def quaternion(rotation):
+    x, y, z, w = rotation.as_quat().tolist()
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def numbers(message, axes):
+    return [getattr(message, axis) for axis in axes]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_transformed_pose_is_rotated_then_translated(over_the_wire, seed):
+    draw = np.random.default_rng(seed)
+    turn, facing = (Rotation.from_quat(draw.normal(size=4)) for _ in range(2))
+    at, by = draw.normal(scale=100.0, size=(2, 3))
+    transform = Transform(translation=Vector3(**dict(zip("xyz", by.tolist(), strict=True))), rotation=quaternion(turn))
+    pose = PoseMessage(position=Point(**dict(zip("xyz", at.tolist(), strict=True))), orientation=quaternion(facing))
+    there = over_the_wire(transformed(over_the_wire(pose), over_the_wire(transform)))
+    assert numbers(there.position, "xyz") == pytest.approx(turn.apply(at) + by, abs=1e-11)
+    found = Rotation.from_quat(numbers(there.orientation, "xyzw"))
+    assert (found * (turn * facing).inv()).magnitude() < 1e-14
+
+
+def test_a_pose_is_not_changed_by_no_transform():
+    pose = stamped(x=3.0, y=-4.0, z=5.0, q=(0.0, 0.0, 0.6, 0.8)).pose
+    assert transformed(pose, Transform()) == pose
+
+
+def test_a_transform_in_the_plane_adds_its_yaw():
+    transform = Transform(translation=Vector3(x=1.0, y=2.0, z=0.0), rotation=quaternion(Rotation.from_euler("z", math.pi / 2)))
+    there = transformed(pose_message((3.0, 0.5, 2.0)), transform)
+    assert pose_from("goal", there) == pytest.approx((0.5, 5.0, 2.0 + math.pi / 2 - 2 * math.pi), abs=1e-12)
+
+
+def test_what_is_wrong_with_a_pose_is_still_wrong_in_another_frame():
+    transform = Transform(rotation=quaternion(Rotation.from_euler("z", 0.5)))
+    for message, reason in ((stamped(x=NAN), "finite"), (stamped(q=(0.0, 0.0, 0.0, 2.0)), "norm is 2"),
+                            (stamped(q=(0.0, 1.0, 0.0, 0.0)), "leans by 3.14")):
+        with pytest.raises(InvalidPose, match=reason):
+            pose_from("goal", transformed(message.pose, transform))
 
 
 def test_height_small_tilt_and_three_decimals_are_taken():

@@ -1,6 +1,7 @@
 """A plan as markers, through the wire format."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from visualization_msgs.msg import Marker
 from dubins_rrt_ros.node.markers import tree_markers
 
 STAMP = Time(sec=12, nanosec=34)
+MANY = 50_000
 
 
 @pytest.fixture
 def markers(plans, over_the_wire):
-    return over_the_wire(tree_markers(plans["solved"], "map", STAMP)).markers
+    return over_the_wire(tree_markers(plans["solved"], "map", STAMP, MANY)).markers
 
 
 def by_namespace(markers):
@@ -69,12 +71,32 @@ def test_the_path_is_drawn_from_start_to_goal(markers, plans):
 
 
 def test_without_a_path_start_and_goal_are_shown_and_no_empty_lines(plans, over_the_wire):
-    shown = by_namespace(over_the_wire(tree_markers(plans["blocked"], "map", STAMP)).markers)
+    shown = by_namespace(over_the_wire(tree_markers(plans["blocked"], "map", STAMP, MANY)).markers)
     assert {"start", "goal"} <= set(shown)
     assert "path" not in shown
-    assert all(marker.points for marker in shown.values() if marker.type != Marker.ARROW)
+    assert all(marker.points for marker in shown.values() if marker.type in (Marker.LINE_LIST, Marker.LINE_STRIP))
+
+
+@pytest.mark.parametrize("most", [1, 7, 100])
+def test_of_a_large_tree_the_lines_of_its_oldest_nodes_are_shown(plans, over_the_wire, markers, most):
+    shown = by_namespace(over_the_wire(tree_markers(plans["solved"], "map", STAMP, most)).markers)
+    assert xy(shown["tree"]).tolist() == xy(by_namespace(markers)["tree"])[:2 * most].tolist()
+    assert shown["path"] == by_namespace(markers)["path"]
+
+
+def test_where_it_failed_is_a_disc_in_sight(plans, over_the_wire):
+    plan = replace(plans["blocked"], culprit=(4.25, 6.5))
+    culprit = by_namespace(over_the_wire(tree_markers(plan, "map", STAMP, MANY)).markers)["culprit"]
+    assert culprit.type == Marker.CYLINDER
+    assert (culprit.pose.position.x, culprit.pose.position.y) == (4.25, 6.5)
+    assert culprit.pose.orientation.w == 1.0
+    assert culprit.color.a > 0 and min(culprit.scale.x, culprit.scale.y, culprit.scale.z) > 0
+
+
+def test_without_a_culprit_none_is_shown(markers):
+    assert "culprit" not in by_namespace(markers)
 
 
 def test_without_a_plan_everything_is_cleared(over_the_wire):
-    markers = over_the_wire(tree_markers(None, "map", STAMP)).markers
+    markers = over_the_wire(tree_markers(None, "map", STAMP, MANY)).markers
     assert [marker.action for marker in markers] == [Marker.DELETEALL]

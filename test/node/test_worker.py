@@ -1,188 +1,162 @@
-"""The worker: newest request wins, anytime reports, cancel and close. Plain threads, no ROS."""
+"""The worker: one job after the other, outcomes, cancel and close. Plain threads, no ROS."""
 
 import queue
 import threading
-import time
-from types import SimpleNamespace
 
 import pytest
 
-from dubins_rrt_ros.node.worker import IMPROVEMENT_INTERVAL, Request, Worker
+from dubins_rrt_ros.node.worker import Worker
 
 SOON = 5.0
 
 
-class Planning:
-    """Stands in for plan(): it shows what it was called with and ends when told to or cancelled."""
+class Job:
+    """Ends when it is told to or cancelled, and shows how far it is."""
 
-    def __init__(self):
-        self.calls = queue.Queue()
+    def __init__(self, name):
+        self.name = name
+        self.begun, self.end = threading.Event(), threading.Event()
+        self.thread = None
 
-    def __call__(self, problem, settings, *, cancel, on_progress):
-        call = SimpleNamespace(problem=problem, cancel=cancel, on_progress=on_progress,
-                               thread=threading.current_thread(), end=threading.Event())
-        self.calls.put(call)
-        while not call.end.wait(0.001) and not cancel():
+    def __call__(self, cancelled):
+        self.thread = threading.current_thread()
+        self.begun.set()
+        while not self.end.wait(0.001) and not cancelled():
             pass
-        return SimpleNamespace(path="final", of=problem, cancelled=cancel())
+        return f"{self.name} {'cancelled' if cancelled() else 'done'}"
 
 
 @pytest.fixture
-def planning():
-    return Planning()
-
-
-@pytest.fixture
-def reports():
+def outcomes():
     return queue.Queue()
 
 
 @pytest.fixture
-def worker(planning, reports):
-    worker = Worker(reports.put, planning)
+def worker():
+    worker = Worker("worker under test")
     yield worker
     assert worker.close(SOON)
 
 
-def request(number):
-    return Request(number, f"problem {number}", "settings")
+def begun(job):
+    assert job.begun.wait(SOON), f"{job.name} was not begun"
+    return job
 
 
-def progress(improved, path="better"):
-    return SimpleNamespace(improved=improved, snapshot=lambda: SimpleNamespace(path=path))
+def test_a_job_is_done_in_another_thread_and_its_outcome_given(worker, outcomes):
+    job = Job("one")
+    worker.submit(job, outcomes.put)
+    assert begun(job).thread.name == "worker under test"
+    assert outcomes.empty()
+    job.end.set()
+    assert outcomes.get(timeout=SOON) == "one done"
 
 
-def test_a_request_is_planned_in_another_thread_and_its_end_reported(worker, planning, reports):
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
-    assert call.thread is not threading.current_thread()
-    call.end.set()
-    report = reports.get(timeout=SOON)
-    assert (report.request_id, report.plan.of, report.last, report.error) == (1, "problem 1", True, None)
+def test_the_outcome_is_given_in_the_worker_s_thread(worker, outcomes):
+    worker.submit(lambda cancelled: None, lambda outcome: outcomes.put(threading.current_thread().name))
+    assert outcomes.get(timeout=SOON) == "worker under test"
 
 
-def test_the_newest_request_cancels_the_one_that_is_planned(worker, planning, reports):
-    worker.submit(request(1))
-    first = planning.calls.get(timeout=SOON)
-    worker.submit(request(2))
-    second = planning.calls.get(timeout=SOON)
-    assert first.cancel() and not second.cancel()
-    second.end.set()
-    assert [reports.get(timeout=SOON).request_id for _ in range(2)] == [1, 2]
+def test_jobs_are_done_one_at_a_time_in_the_order_in_which_they_come(worker, outcomes):
+    jobs = [Job(str(number)) for number in range(50)]
+    for job in jobs:
+        worker.submit(job, outcomes.put)
+    for job, later in zip(jobs, [*jobs[1:], None], strict=True):
+        begun(job)
+        assert later is None or not later.begun.is_set()
+        job.end.set()
+        assert outcomes.get(timeout=SOON) == f"{job.name} done"
 
 
-def test_of_many_requests_that_wait_only_the_newest_is_planned(reports):
-    begun, gate = threading.Event(), threading.Event()
-
-    def plan(problem, settings, *, cancel, on_progress):
-        begun.set()
-        gate.wait(SOON)
-        return SimpleNamespace(path=None)
-
-    worker = Worker(reports.put, plan)
-    worker.submit(request(1))
-    assert begun.wait(SOON)
-    for number in range(2, 100):
-        worker.submit(request(number))
-    gate.set()
-    assert [reports.get(timeout=SOON).request_id for _ in range(2)] == [1, 99]
-    assert worker.close(SOON)
-    assert reports.empty()
-
-
-def test_cancel_ends_the_present_request_and_the_next_is_not_affected(worker, planning, reports):
-    worker.submit(request(1))
-    planning.calls.get(timeout=SOON)
+def test_cancel_reaches_the_job_that_is_done_and_those_that_wait_and_each_has_its_outcome(worker, outcomes):
+    jobs = [Job(name) for name in ("one", "two", "three")]
+    for job in jobs:
+        worker.submit(job, outcomes.put)
+    begun(jobs[0])
     worker.cancel()
-    assert reports.get(timeout=SOON).plan.cancelled
-    worker.submit(request(2))
-    call = planning.calls.get(timeout=SOON)
-    call.end.set()
-    assert not reports.get(timeout=SOON).plan.cancelled
+    assert [outcomes.get(timeout=SOON) for _ in jobs] == ["one cancelled", "two cancelled", "three cancelled"]
 
 
-def test_cancel_without_a_request_does_nothing(worker, planning, reports):
+def test_what_is_submitted_after_a_cancellation_is_not_cancelled(worker, outcomes):
+    first, second = Job("first"), Job("second")
+    worker.submit(first, outcomes.put)
+    begun(first)
     worker.cancel()
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
-    assert not call.cancel()
-    call.end.set()
-    assert reports.get(timeout=SOON).request_id == 1
+    worker.submit(second, outcomes.put)
+    assert outcomes.get(timeout=SOON) == "first cancelled"
+    begun(second).end.set()
+    assert outcomes.get(timeout=SOON) == "second done"
 
 
-def test_the_first_path_is_reported_at_once_and_later_ones_when_the_interval_is_over(worker, planning, reports):
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
-    call.on_progress(progress(improved=False))
-    assert reports.empty()
-    first = time.monotonic()
-    call.on_progress(progress(improved=True))
-    assert not reports.get(timeout=SOON).last
-    call.on_progress(progress(improved=True))
-    assert reports.empty()
-    while reports.empty():  # the improvement is due by itself, though nothing better comes
-        call.on_progress(progress(improved=False))
-        assert time.monotonic() - first < SOON
-    assert time.monotonic() - first >= IMPROVEMENT_INTERVAL
-    reports.get()
-    call.end.set()
-    assert reports.get(timeout=SOON).last
-
-
-def test_no_snapshot_is_made_where_nothing_improved_or_the_request_is_cancelled(worker, planning, reports):
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
-    call.on_progress(SimpleNamespace(improved=False))  # it has no snapshot to call
+def test_cancel_without_a_job_does_nothing(worker, outcomes):
     worker.cancel()
-    call.on_progress(SimpleNamespace(improved=True))
-    assert reports.get(timeout=SOON).last
+    job = Job("one")
+    worker.submit(job, outcomes.put)
+    begun(job).end.set()
+    assert outcomes.get(timeout=SOON) == "one done"
 
 
-def test_a_snapshot_without_a_path_is_no_news(worker, planning, reports):
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
-    call.on_progress(progress(improved=True, path=None))
-    call.end.set()
-    assert reports.get(timeout=SOON).last
+def test_a_defect_is_the_outcome_with_its_trace_and_the_thread_lives_on(worker, outcomes):
+    def fail(cancelled):
+        raise ZeroDivisionError("a defect")
+
+    worker.submit(fail, outcomes.put)
+    error = outcomes.get(timeout=SOON)
+    assert isinstance(error, ZeroDivisionError)
+    assert error.__traceback__ is not None
+    worker.submit(lambda cancelled: "fine", outcomes.put)
+    assert outcomes.get(timeout=SOON) == "fine"
 
 
-def test_a_defect_is_reported_with_its_trace_and_the_thread_lives_on(reports):
-    def plan(problem, settings, *, cancel, on_progress):
-        if problem == "problem 1":
-            raise ZeroDivisionError("a defect")
-        return SimpleNamespace(path=None)
+def test_jobs_from_many_threads_are_all_done(worker, outcomes):
+    def submit(number):
+        for i in range(100):
+            worker.submit(lambda cancelled, i=i: (number, i), outcomes.put)
 
-    worker = Worker(reports.put, plan)
-    worker.submit(request(1))
-    report = reports.get(timeout=SOON)
-    assert report.last and report.plan is None
-    assert isinstance(report.error, ZeroDivisionError) and report.error.__traceback__ is not None
-    worker.submit(request(2))
-    assert reports.get(timeout=SOON).error is None
+    threads = [threading.Thread(target=submit, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    done = [outcomes.get(timeout=SOON) for _ in range(400)]
+    for number in range(4):
+        assert [i for who, i in done if who == number] == list(range(100))
+
+
+def test_a_job_may_submit_another(worker, outcomes):
+    worker.submit(lambda cancelled: worker.submit(lambda cancelled: "inner", outcomes.put), outcomes.put)
+    assert [outcomes.get(timeout=SOON) for _ in range(2)] == [None, "inner"]
+
+
+def test_close_cancels_the_job_that_is_done_begins_no_other_and_ends_the_thread(outcomes):
+    worker, job, waiting = Worker("closing"), Job("one"), Job("two")
+    worker.submit(job, outcomes.put)
+    worker.submit(waiting, outcomes.put)
+    begun(job)
     assert worker.close(SOON)
+    assert not job.thread.is_alive()
+    assert not waiting.begun.is_set()
+    assert outcomes.get_nowait() == "one cancelled"
+    assert outcomes.empty()
 
 
-def test_close_cancels_ends_the_thread_and_delivers_nothing_more(planning, reports):
-    worker = Worker(reports.put, planning)
-    worker.submit(request(1))
-    call = planning.calls.get(timeout=SOON)
+def test_close_of_an_idle_worker_ends_its_thread_and_may_be_called_again():
+    worker = Worker("idle")
     assert worker.close(SOON)
-    assert not call.thread.is_alive()
-    assert reports.empty()
+    assert worker.close(SOON)
+    assert "idle" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_close_tells_of_a_planner_that_does_not_heed_its_cancellation(reports):
-    begun, end = threading.Event(), threading.Event()
+def test_close_tells_of_a_job_that_does_not_heed_its_cancellation(outcomes):
+    started, end = threading.Event(), threading.Event()
 
-    def plan(problem, settings, *, cancel, on_progress):
-        begun.set()
+    def stubborn(cancelled):
+        started.set()
         end.wait(SOON)
-        return SimpleNamespace(path=None)
 
-    worker = Worker(reports.put, plan)
-    worker.submit(request(1))
-    assert begun.wait(SOON)
+    worker = Worker("stubborn")
+    worker.submit(stubborn, outcomes.put)
+    assert started.wait(SOON)
     assert not worker.close(0.01)
     end.set()
     assert worker.close(SOON)
-    assert reports.empty()

@@ -1,0 +1,159 @@
+"""The contract's parameters, one by one: type, default, description, range, and what a change does. Through the executable."""
+
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from harness import poses_of
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import DescribeParameters, GetParameters
+from rclpy.parameter import parameter_value_to_python
+from rosgraph_msgs.msg import Clock
+from yard import GOAL, IN_UNKNOWN, QUICK, START, yard
+
+from dubins_rrt_ros.planning import GridMap, save_map
+
+#: Of each parameter the type, the default where the contract has one, and a value that is refused.
+DOUBLE, INTEGER, BOOL, STRING = (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL,
+                                 ParameterType.PARAMETER_STRING)
+PARAMETERS = {
+    "map_file": (STRING, None, "other.yaml"),
+    "global_frame": (STRING, "map", ""),
+    "planner": (STRING, "rrt_star", "dijkstra"),
+    "turning_radius": (DOUBLE, 1.0, -1.0),
+    "wheelbase": (DOUBLE, None, -1.0),
+    "max_steering_angle": (DOUBLE, None, 2.0),
+    "robot_radius": (DOUBLE, 0.2, -0.1),
+    "footprint": (STRING, None, "a box"),
+    "allow_unknown": (BOOL, False, "no"),
+    "samples": (INTEGER, 3000, 0),
+    "planning_time": (DOUBLE, 1.0, 0.0),
+    "goal_bias": (DOUBLE, None, 1.5),
+    "step_size": (DOUBLE, 0.0, -1.0),
+    "heading_sampling": (STRING, None, "random"),
+    "informed": (BOOL, True, 1),
+    "shortcut": (BOOL, True, 1),
+    "goal_tolerance_xy": (DOUBLE, None, -0.1),
+    "goal_tolerance_yaw": (DOUBLE, None, 4.0),
+    "any_goal_heading": (BOOL, None, "no"),
+    "path_spacing": (DOUBLE, None, 0.0),
+    "seed": (INTEGER, -1, -2),
+    "publish_tree": (BOOL, None, "no"),
+    "replan_on_map_change": (BOOL, None, "no"),
+    "map_transient_local": (BOOL, None, "no"),
+    "max_map_cells": (INTEGER, None, 0),
+}
+CHOICES = {"planner": ["rrt", "rrt_star"], "heading_sampling": ["uniform", "goal", "field", "mixed"]}
+
+
+@pytest.fixture(scope="module")
+def defaults(module_planners):
+    """The client of a planner that was given no parameters."""
+    module_planners.start()
+    return module_planners.client()
+
+
+@pytest.fixture(scope="module")
+def map_file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("maps") / "yard.yaml"
+    save_map(GridMap(yard(), 0.1), file)
+    return str(file)
+
+
+@pytest.fixture(scope="module")
+def on_the_yard(module_planners, defaults, map_file):
+    """The client of a planner with a map."""
+    module_planners.start(map_file=map_file)
+    return module_planners.client()
+
+
+def changed(client, **values):
+    """Set what is wanted, all else that these tests change as in QUICK and by default."""
+    usual = {"planner": "rrt_star", "path_spacing": 0.05, "turning_radius": 1.0, "allow_unknown": False}
+    assert client.set_parameters(**usual | QUICK | values).successful
+
+
+def longest_step(path):
+    return np.linalg.norm(np.diff(poses_of(path)[:, :2], axis=0), axis=1).max()
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_a_parameter_has_its_type_default_description_and_range(defaults, name):
+    kind, default, _ = PARAMETERS[name]
+    described, = defaults.call(DescribeParameters, "describe_parameters", names=[name]).descriptors
+    assert described.type == kind, f"{name} is not declared, or of another type"
+    assert len(described.description.split()) >= 3
+    if kind in (DOUBLE, INTEGER):
+        allowed, = described.floating_point_range if kind == DOUBLE else described.integer_range
+        assert allowed.from_value < allowed.to_value
+        assert default is None or allowed.from_value <= default <= allowed.to_value
+    for choice in CHOICES.get(name, ()):
+        assert re.search(rf"\b{choice}\b", described.additional_constraints)
+
+
+@pytest.mark.parametrize("name", [name for name, (_, default, _) in PARAMETERS.items() if default is not None])
+def test_a_parameter_has_its_default(defaults, name):
+    value, = defaults.call(GetParameters, "get_parameters", names=[name]).values
+    assert parameter_value_to_python(value) == PARAMETERS[name][1]
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_a_bad_value_of_a_parameter_is_refused_with_the_reason_while_the_node_runs(defaults, name):
+    before, = defaults.call(GetParameters, "get_parameters", names=[name]).values
+    result = defaults.set_parameters(**{name: PARAMETERS[name][2]})
+    assert not result.successful
+    assert len(result.reason.split()) >= 3
+    after, = defaults.call(GetParameters, "get_parameters", names=[name]).values
+    assert after == before
+
+
+def test_a_change_holds_from_the_next_request_on(on_the_yard):
+    changed(on_the_yard)
+    path, told = on_the_yard.plan(START, GOAL)
+    assert told["planner"] == "rrt_star"
+    assert longest_step(path) <= 0.05 + 1e-9
+    assert float(told["max_curvature"]) <= 1.0 + 1e-6
+    changed(on_the_yard, planner="rrt", path_spacing=0.5, turning_radius=0.5, seed=7)
+    path, told = on_the_yard.plan(START, GOAL)
+    assert (told["planner"], told["seed"]) == ("rrt", "7")
+    assert 0.05 < longest_step(path) <= 0.5 + 1e-9
+    assert float(told["max_curvature"]) == pytest.approx(2.0)
+
+
+def test_allow_unknown_lets_it_drive_there(on_the_yard):
+    changed(on_the_yard, allow_unknown=True)
+    path, told = on_the_yard.plan(START, IN_UNKNOWN)
+    assert told["error_name"] == "NONE"
+    assert poses_of(path)[-1, :2].tolist() == list(IN_UNKNOWN[:2])
+
+
+def test_seed_minus_one_is_fresh_each_time_and_reported(on_the_yard):
+    changed(on_the_yard, seed=-1)
+    seeds = {int(on_the_yard.plan(START, GOAL)[1]["seed"]) for _ in range(3)}
+    assert len(seeds) == 3
+    assert min(seeds) >= 0
+
+
+def test_the_same_seed_and_sample_budget_give_the_same_path(on_the_yard):
+    changed(on_the_yard)
+    first, second = (poses_of(on_the_yard.plan(START, GOAL)[0]).tolist() for _ in range(2))
+    assert first == second
+
+
+def test_use_sim_time_stamps_by_the_clock(planners, map_file):
+    planners.start(map_file=map_file, use_sim_time=True, **QUICK)
+    client = planners.client()
+    clock = client.node.create_publisher(Clock, "/clock", 10)
+    message = Clock()
+    message.clock.sec = 12345
+
+    def stamped():
+        clock.publish(message)
+        path, _ = client.plan(START, GOAL)
+        return path if path.header.stamp.sec else None
+
+    path = client.wait_for(stamped, "a path stamped by the clock")
+    assert {pose.header.stamp.sec for pose in path.poses} == {path.header.stamp.sec} == {12345}

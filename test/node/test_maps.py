@@ -1,0 +1,214 @@
+"""Maps that change while the node plans or shows a path, by topic, through the executable."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from harness import occupancy, poses_of, values_of
+from nav_msgs.srv import GetMap, LoadMap
+from std_srvs.srv import Trigger
+from yard import ENDLESS, GOAL, QUICK, START
+
+from dubins_rrt_ros.planning import GridMap
+
+
+def walled(*rows_and_columns):
+    """10 m x 10 m with walls, each the rows and columns that it takes."""
+    cells = np.zeros((100, 100), dtype=np.int8)
+    for part in rows_and_columns:
+        cells[part] = 100
+    return cells
+
+
+FREE = walled()
+#: A wall across the way from START to GOAL that leaves 2 m at the lower edge.
+DETOUR = walled(np.s_[20:, 50:52])
+CLOSED = walled(np.s_[:, 50:52])
+#: A box far from the way.
+HARMLESS = walled(np.s_[95:, :5])
+
+
+def id_of(cells):
+    return GridMap(cells, 0.1).id
+
+
+@pytest.fixture(scope="module")
+def replanning(module_planners):
+    process = module_planners.start(replan_on_map_change=True, **QUICK)
+    return process, module_planners.client()
+
+
+@pytest.fixture(scope="module")
+def plain(module_planners):
+    process = module_planners.start(**QUICK)
+    return process, module_planners.client()
+
+
+def publish(client, process, cells):
+    """Publish a map; it is in use and prepared when this returns."""
+    ready = f"The map is ready, id {id_of(cells)}"
+    before = process.output.count(ready)
+    client.publish_map(occupancy(cells))
+    client.wait_for(lambda: process.output.count(ready) > before, f"{ready!r} in the log")
+
+
+def show_path(client, process):
+    """The id of a request whose path, straight through the free map, is on display."""
+    client.call(Trigger, "cancel")
+    client.set_parameters(**QUICK)
+    publish(client, process, FREE)
+    client.send("start_pose", START)
+    return end_of_goal(client)
+
+
+def end_of_goal(client):
+    plan_id = client.next_id
+    client.send("goal_pose", GOAL)
+    told = client.status_of(plan_id, samples=str(QUICK["samples"]))
+    assert (told["error_name"], told["map_id"]) == ("NONE", id_of(FREE))
+    client.wait_for(lambda: client.paths and len(client.paths[-1].poses) > 1, "its path")
+    return plan_id
+
+
+def distance_to_wall(path, cells):
+    """The least distance from a path's points to the occupied cells [m]."""
+    rows, columns = np.nonzero(cells)
+    low = np.stack([columns, rows], axis=1) * 0.1
+    off = np.maximum(np.maximum(low - (points := path[:, None, :2]), points - low - 0.1), 0.0)
+    return np.hypot(off[..., 0], off[..., 1]).min()
+
+
+def wait_for_path_around(client, cells):
+    """Until the path on display keeps away from the occupied cells, as the ones before did not."""
+    client.wait_for(lambda: client.paths[-1].poses and distance_to_wall(poses_of(client.paths[-1]), cells) >= 0.2,
+                    "a path around")
+
+
+def statuses_of(client, plan_id):
+    return [values_of(status) for status in client.statuses if values_of(status)["plan_id"] == str(plan_id)]
+
+
+def test_a_request_keeps_the_map_that_it_began_with_and_the_next_has_the_new_one(plain):
+    process, client = plain
+    show_path(client, process)
+    client.set_parameters(**ENDLESS)
+    plan_id = client.next_id
+    client.send("goal_pose", GOAL)
+    client.status_of(plan_id, error_name="NONE")
+    publish(client, process, DETOUR)
+    message = client.call(Trigger, "cancel").message
+    client.wait_for(lambda: client.statuses[-1].message == message, "the end of the request")
+    assert {told["map_id"] for told in statuses_of(client, plan_id)} == {id_of(FREE)}
+
+    client.set_parameters(**QUICK)
+    client.send("goal_pose", GOAL)
+    told = client.status_of(plan_id + 1, samples=str(QUICK["samples"]))
+    assert (told["error_name"], told["map_id"]) == ("NONE", id_of(DETOUR))
+    wait_for_path_around(client, DETOUR)
+
+
+def test_a_path_that_a_new_map_blocks_is_withdrawn_and_planned_again(replanning):
+    process, client = replanning
+    plan_id = show_path(client, process)
+    shown = len(client.paths)
+    publish(client, process, DETOUR)
+    told = client.status_of(plan_id + 1, samples=str(QUICK["samples"]))
+    assert (told["error_name"], told["map_id"]) == ("NONE", id_of(DETOUR))
+    client.wait_for_word("The map changed, and the published path is not free on it")
+    wait_for_path_around(client, DETOUR)
+    assert client.paths[shown].poses == []
+    path = poses_of(client.paths[-1])
+    assert path[0].tolist() == list(START)
+    assert path[-1] == pytest.approx(GOAL, abs=1e-9)
+
+
+def test_a_path_that_a_new_map_leaves_free_is_left_alone(replanning):
+    process, client = replanning
+    show_path(client, process)
+    told, shown, checked = len(client.statuses), len(client.paths), process.output.count("is free on it too")
+    publish(client, process, HARMLESS)
+    client.wait_for(lambda: process.output.count("is free on it too") > checked, "the check in the log")
+    client.call(GetMap, "get_map")
+    assert (len(client.statuses), len(client.paths)) == (told, shown)
+
+
+def test_a_path_that_was_left_alone_is_checked_against_the_map_after_it_too(replanning):
+    process, client = replanning
+    plan_id = show_path(client, process)
+    checked = process.output.count("is free on it too")
+    publish(client, process, HARMLESS)
+    client.wait_for(lambda: process.output.count("is free on it too") > checked, "the check in the log")
+    publish(client, process, DETOUR)
+    assert client.status_of(plan_id + 1, samples=str(QUICK["samples"]))["map_id"] == id_of(DETOUR)
+
+
+def test_a_map_that_leaves_no_way_ends_in_an_error_and_an_empty_path(replanning):
+    process, client = replanning
+    plan_id = show_path(client, process)
+    publish(client, process, CLOSED)
+    told = client.status_of(plan_id + 1, error_code="208")
+    assert (told["level"], told["error_name"], told["map_id"]) == (DiagnosticStatus.ERROR, "NO_VALID_PATH", id_of(CLOSED))
+    client.wait_for(lambda: not client.paths[-1].poses, "an empty path")
+    assert client.paths[-1].header.frame_id == "map"
+
+
+def test_after_an_error_a_new_map_is_not_planned_on_by_itself(replanning):
+    process, client = replanning
+    plan_id = show_path(client, process)
+    publish(client, process, CLOSED)
+    client.status_of(plan_id + 1, error_code="208")
+    publish(client, process, FREE)
+    assert values_of(client.statuses[-1])["plan_id"] == str(plan_id + 1)
+    assert end_of_goal(client) == plan_id + 2
+
+
+def test_a_map_that_changes_during_a_request_is_checked_when_it_ends(replanning):
+    process, client = replanning
+    show_path(client, process)
+    client.set_parameters(samples=ENDLESS["samples"], planning_time=1.0)
+    plan_id = client.next_id
+    client.send("goal_pose", GOAL)
+    client.status_of(plan_id, error_name="NONE")
+    publish(client, process, DETOUR)
+    told = client.status_of(plan_id + 1, error_name="NONE")
+    assert told["map_id"] == id_of(DETOUR)
+    assert {told["map_id"] for told in statuses_of(client, plan_id)} == {id_of(FREE)}
+    wait_for_path_around(client, DETOUR)
+
+
+def test_a_refused_map_changes_nothing(replanning):
+    process, client = replanning
+    show_path(client, process)
+    publish(client, process, HARMLESS)
+    told, shown = len(client.statuses), len(client.paths)
+    client.publish_map(occupancy(CLOSED, frame="odom"))
+    client.wait_for_word("in frame 'odom', not in 'map'")
+    client.call(LoadMap, "load_map", map_url="nowhere")  # what follows a refusal comes before the next answer
+    client.call(GetMap, "get_map")
+    assert (len(client.statuses), len(client.paths)) == (told, shown)
+    assert process.output.split("in frame 'odom'")[1].count("The map changed") == 0
+
+
+def test_without_the_parameter_a_new_map_leaves_the_path_alone(plain):
+    process, client = plain
+    plan_id = show_path(client, process)
+    told, shown = len(client.statuses), len(client.paths)
+    publish(client, process, CLOSED)
+    client.call(GetMap, "get_map")
+    assert (len(client.statuses), len(client.paths)) == (told, shown)
+    assert "The map changed" not in process.output
+    client.send("goal_pose", GOAL)
+    assert client.status_of(plan_id + 1)["error_name"] == "NO_VALID_PATH"
+
+
+def test_the_parameter_may_be_set_while_the_node_runs(plain):
+    process, client = plain
+    plan_id = show_path(client, process)
+    client.set_parameters(replan_on_map_change=True)
+    try:
+        publish(client, process, DETOUR)
+        assert client.status_of(plan_id + 1, samples=str(QUICK["samples"]))["map_id"] == id_of(DETOUR)
+    finally:
+        client.set_parameters(replan_on_map_change=False)

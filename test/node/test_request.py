@@ -1,0 +1,133 @@
+"""A request as a worker serves it: improvements as they come, cancellation, a map that is still prepared. No ROS, no mocks."""
+
+import itertools
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dubins_rrt_ros.node import request as module
+from dubins_rrt_ros.node.request import IMPROVEMENT_INTERVAL, Refusal, Request, _Throttle
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle
+
+ENDLESS = {"samples": 10_000_000, "planning_time": 600.0, "seed": 1}
+
+
+@pytest.fixture(scope="module")
+def problem():
+    cells = np.zeros((100, 100), dtype=np.int8)
+    cells[40:60, 40:60] = 100
+    return Problem(GridMap(cells, 0.1), Vehicle(), (1.5, 5.0, 0.0), (8.5, 5.0, 0.5))
+
+
+@pytest.fixture
+def request_for(problem):
+    """A function that makes a request whose map is prepared."""
+    def make(wanted=problem, **settings):
+        prepared = threading.Event()
+        prepared.set()
+        return Request(1, wanted, Settings(**settings), prepared)
+    return make
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The time that the throttle sees, in a list of one."""
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    return now
+
+
+def never():
+    return False
+
+
+def test_a_request_is_answered_as_the_planner_answers_it(request_for):
+    reported = []
+    answer = request_for(samples=300, planning_time=60.0, seed=1).serve(reported.append, never)
+    assert (answer.status, answer.audit, answer.samples, answer.cancelled) == (Status.NONE, "ok", 300, False)
+    assert all(report.path is not None and report.audit == "ok" for report in reported)
+    lengths = [plan.length for plan in (*reported, answer)]
+    assert lengths == sorted(lengths, reverse=True)
+
+
+def test_the_first_path_is_reported_though_the_search_goes_on_and_nothing_after_a_cancellation(request_for):
+    reported = []
+    answer = request_for(**ENDLESS).serve(reported.append, lambda: bool(reported))
+    assert answer.cancelled
+    assert answer.path is not None
+    assert len(reported) == 1
+    assert reported[0].samples <= answer.samples < ENDLESS["samples"]
+
+
+def test_nothing_is_reported_without_a_path(request_for, problem):
+    reported = []
+    answer = request_for(replace(problem, goal=(5.0, 5.0, 0.0)), samples=100, seed=1).serve(reported.append, never)
+    assert (answer.status, reported) == (Status.GOAL_OCCUPIED, [])
+
+
+def test_a_request_that_was_cancelled_before_is_not_planned(request_for):
+    with pytest.raises(Refusal, match="Cancelled before a first path") as refusal:
+        request_for(**ENDLESS).serve(pytest.fail, lambda: True)
+    assert refusal.value.status is Status.CANCELLED
+
+
+def test_a_request_waits_until_its_map_is_prepared(problem):
+    prepared, waiting = threading.Event(), threading.Event()
+    answers = []
+
+    def not_cancelled():
+        waiting.set()
+        return False
+
+    serving = threading.Thread(target=lambda: answers.append(
+        Request(1, problem, Settings(samples=100, planning_time=60.0, seed=1), prepared).serve(lambda plan: None, not_cancelled)))
+    serving.start()
+    assert waiting.wait(5.0)
+    assert answers == []
+    prepared.set()
+    serving.join(60.0)
+    assert answers[0].status is Status.NONE
+
+
+def test_a_request_can_be_cancelled_while_its_map_is_prepared(problem):
+    asked = itertools.count()
+    with pytest.raises(Refusal) as refusal:
+        Request(1, problem, Settings(), threading.Event()).serve(pytest.fail, lambda: next(asked) > 2)
+    assert refusal.value.status is Status.CANCELLED
+
+
+def test_a_defect_in_the_planner_is_raised(request_for, monkeypatch):
+    def fail(*args, **kwargs):
+        raise ZeroDivisionError("a defect")
+
+    monkeypatch.setattr(module, "plan", fail)
+    with pytest.raises(ZeroDivisionError, match="a defect"):
+        request_for().serve(pytest.fail, never)
+
+
+def test_the_throttle_lets_the_first_improvement_pass_at_once(clock):
+    throttle = _Throttle(IMPROVEMENT_INTERVAL)
+    assert not throttle.lets_pass(False)
+    assert throttle.lets_pass(True)
+
+
+def test_the_throttle_keeps_a_later_improvement_until_the_interval_is_over(clock):
+    throttle = _Throttle(1.0)
+    assert throttle.lets_pass(True)
+    assert not throttle.lets_pass(True)
+    clock[0] += 0.5
+    assert not throttle.lets_pass(False)
+    clock[0] += 0.5
+    assert throttle.lets_pass(False)  # it is due by itself, though nothing better comes
+    clock[0] += 10.0
+    assert not throttle.lets_pass(False)  # and once alone
+
+
+def test_the_throttle_lets_an_improvement_after_a_pause_pass_at_once(clock):
+    throttle = _Throttle(1.0)
+    assert throttle.lets_pass(True)
+    clock[0] += 1.5
+    assert not throttle.lets_pass(False)
+    assert throttle.lets_pass(True)
