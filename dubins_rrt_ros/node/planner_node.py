@@ -1,6 +1,5 @@
 """The planner node: wiring. Callbacks convert, call and publish; workers plan."""
 
-import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,7 +33,7 @@ from .worker import Worker
 START_GRACE = 0.5
 #: How often it is said what is waited for [s].
 WAITING_INTERVAL = 5.0
-#: The time that the workers get to heed their cancellation at shutdown [s].
+#: The time that each worker gets to heed its cancellation at shutdown [s].
 SHUTDOWN_TIMEOUT = 0.2
 
 
@@ -96,9 +95,9 @@ class PlannerNode(Node):
     def close(self) -> None:
         """End the workers; nothing is published afterwards."""
         self._mailbox.close()
-        until = time.monotonic() + SHUTDOWN_TIMEOUT
-        for worker in (self._goal_worker, self._service_worker, self._maps.worker):
-            worker.close(max(0.0, until - time.monotonic()))  # who does not end in time, such as a preparation, ends with us
+        self._maps.worker.close(0.0)  # a preparation heeds no cancellation; it ends with the process
+        for worker in (self._goal_worker, self._service_worker):
+            worker.close(SHUTDOWN_TIMEOUT)
 
     # What is waited for
 
