@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import reasons
-from .audit import audit, prepare_audit
+from .audit import Audit, audit, prepare_audit
 from .bounds import lower_bound
 from .clearance import ClearanceField
 from .map import Map
@@ -38,7 +38,8 @@ def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = l
          on_progress: Callable[[Progress], None] = lambda progress: None) -> Plan:
     """Plan a path from start to goal.
 
-    The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short.
+    The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short. A path that
+    the search has found is shortened in a few milliseconds more, when it is cut short too.
 
     Args:
         problem: what to plan.
@@ -69,12 +70,18 @@ class _Request:
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
         self._bound = lower_bound(problem)
         self._time_to_first = None
+        self._judged: Path | None = None  # by the audit, with this verdict:
+        self._verdict: Audit | None = None
         self._map_time = 0.0
         self._started = time.perf_counter()
 
     @property
     def _elapsed(self) -> float:
         return time.perf_counter() - self._started
+
+    @property
+    def _out_of_time(self) -> bool:
+        return self._elapsed >= self._settings.planning_time
 
     def answer(self, cancel: Callable[[], bool], on_progress: Callable[[Progress], None]) -> Plan:
         """What plan() returns."""
@@ -101,13 +108,17 @@ class _Request:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
         search = Search(self._problem, self._settings, field)
         best, reported = math.inf, 0.0
-        while not search.done and self._elapsed < self._settings.planning_time:
+        ended = self._out_of_time
+        while not ended:
             if cancel():
+                search.shorten(ended=True)
                 return self._best_of(search, cancelled=True) or self._cancelled(search.tree, search.samples)
             search.grow()
-            improved = search.length is not None and search.length < best - LEAST_IMPROVEMENT
-            if improved and self._time_to_first is None:
+            if search.best >= 0 and self._time_to_first is None:
                 self._time_to_first = self._elapsed
+            ended = search.done or self._out_of_time
+            search.shorten(ended)
+            improved = search.length is not None and search.length < best - LEAST_IMPROVEMENT
             if improved or self._elapsed - reported >= REPORT_INTERVAL:
                 best, reported = search.length or math.inf, self._elapsed
                 on_progress(Progress(search.samples, reported, search.length, improved, lambda: self._snapshot(search)))
@@ -127,10 +138,8 @@ class _Request:
 
     def _best_of(self, search: Search, **more) -> Plan | None:
         """The plan with the best path of a search, if it has one."""
-        if search.best < 0:
-            return None
-        tree = search.tree
-        return self._audited(tree.path_to(search.best), tree, search.samples, **more)
+        path = search.path
+        return self._audited(path, search.tree, search.samples, **more) if path else None
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
         message = f"Cancelled before a first path: {self._drawn(samples, len(tree))}."
@@ -144,6 +153,8 @@ class _Request:
         else:
             status, what, more = Status.TIMEOUT, f"No path within planning_time {self._settings.planning_time:g} s", "time"
         why, culprit = reasons.after_search(self._problem, field, tree, more)
+        if self._settings.goal_bias == 0 and self._problem.exact_goal:
+            why, culprit = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
         return self._plan(status, f"{what}: {drawn}; {why}.", tree, samples=search.samples, culprit=culprit)
 
     def _drawn(self, samples: int, nodes: int) -> str:
@@ -152,7 +163,9 @@ class _Request:
 
     def _audited(self, path: Path, tree: Tree, samples: int, *, cancelled: bool = False, running: bool = False) -> Plan:
         """The plan with a path, if the path passes the audit."""
-        verdict = audit(path, self._problem)
+        if self._judged is not path:  # an improvement that was reported is often the answer too
+            self._judged, self._verdict = path, audit(path, self._problem)
+        verdict = self._verdict
         if not verdict.ok:
             message = f"A defect in the planner: its path failed the audit: {'; '.join(verdict.findings)}. Please report it."
             return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit="; ".join(verdict.findings))

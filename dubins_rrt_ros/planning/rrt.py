@@ -8,6 +8,7 @@
         unless it collides, add it                           Grower.extend
         RRT*: by the cheapest of the near links ...          Grower.choose_parent
               ... and reroute those that gain by it          Grower.rewire
+    shorten the best path                                    Search.shorten
 
 The closest link is the one with the shortest Dubins curve to the pose. Near are the e (1 + 1/3) log n links with the shortest
 curves to it (the k-nearest RRT* of Karaman and Frazzoli, 2011, for three dimensions), and all within the longest of these
@@ -17,12 +18,16 @@ curves' length from it.
 import math
 import time
 
+import numpy as np
+
 from ._kernels.grow import Grower
 from ._kernels.tree import SearchTree
 from .clearance import ClearanceField
+from .path import Path
 from .problem import Problem
 from .sampling import Sampler
 from .settings import Settings
+from .shortcut import shortened
 from .tree import Tree
 
 NEAR_FACTOR = math.e * (1 + 1 / 3)
@@ -39,6 +44,8 @@ class Search:
     Attributes:
         samples: how many samples were used so far.
         best: the node that reaches the goal at the least cost, or -1.
+
+    Whoever grows it calls `shorten` after each batch.
     """
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField):
@@ -50,7 +57,11 @@ class Search:
                               problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
         self._sampler = Sampler(problem, settings, field)
+        self._problem = problem
         self._settings = settings
+        self._field = field
+        self._shortest: Path | None = None
+        self._cost_shortened = math.inf
         self._block = self._sampler.draw(0)
         self._used = 0
         self._batch = 8
@@ -70,7 +81,17 @@ class Search:
     @property
     def length(self) -> float | None:
         """Of the best path so far [m], or None."""
-        return self._tree.costs[self.best] if self.best >= 0 else None
+        if self.best < 0:
+            return None
+        cost = self._tree.costs[self.best]
+        return min(cost, self._shortest.length) if self._shortest else cost
+
+    @property
+    def path(self) -> Path | None:
+        """The best path so far: the tree's, or a shorter one that shortcuts made of it or of an earlier one; or None."""
+        if self._shortest and self._shortest.length <= self._tree.costs[self.best]:
+            return self._shortest
+        return self._path_in_tree() if self.best >= 0 else None
 
     @property
     def done(self) -> bool:
@@ -80,7 +101,7 @@ class Search:
     def grow(self) -> None:
         """Grow by a batch of samples, which ends early with the first path."""
         if self._used == len(self._block):
-            self._block = self._sampler.draw(BLOCK)
+            self._block = self._sampler.draw(BLOCK, math.inf if self.length is None else self.length)
             self._used = 0
         left = self._settings.samples - self.samples
         begin, end = self._used, min(self._used + min(self._batch, left), len(self._block))
@@ -92,3 +113,24 @@ class Search:
         self.samples += grown
         self.best = self._grower.best_goal_node()
         self._batch = min(max(1, int(BATCH_TIME * grown / max(took, 1e-6))), 2 * self._batch, BLOCK)
+
+    def shorten(self, ended: bool) -> None:
+        """Try shortcuts of the tree's best path, where it is a new one and the moment is right. The tree stays as it is.
+
+        The moments depend on the samples alone: at the first path, at the end of a block, and when the search has `ended`. So a
+        budget of whole blocks never gives a longer path than a smaller one of whole blocks. Of other budgets only the trees'
+        paths are so ordered: the shortcuts of a longer path can be the better ones.
+        """
+        right = ended or self._shortest is None or self._used == len(self._block)
+        if not (right and self._settings.shortcut and self.best >= 0 and self._tree.costs[self.best] < self._cost_shortened):
+            return
+        self._cost_shortened = self._tree.costs[self.best]
+        path = shortened(self._path_in_tree(), self._field, self._problem.vehicle.robot_radius)
+        if self._shortest is None or path.length < self._shortest.length:
+            self._shortest = path
+
+    def _path_in_tree(self) -> Path:
+        """The path to `best`; the tree is not copied for it."""
+        grown = self._tree
+        arrays = (np.asarray(view) for view in (grown.poses, grown.parents, grown.costs, grown.words, grown.lengths))
+        return Tree(grown.radius, *arrays).path_to(self.best)

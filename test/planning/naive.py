@@ -144,6 +144,17 @@ def costs(parents, lengths):
     return out
 
 
+def shortest_chain(count, length_between):
+    """(count,): the least length of a chain of steps from 0 to each of `count` stations, each step forwards.
+
+    `length_between` gives that of the step from one station to a later one; infinity where there is none.
+    """
+    out = np.zeros(count)
+    for end in range(1, count):
+        out[end] = min(out[begin] + length_between(begin, end) for begin in range(end))
+    return out
+
+
 def widest(clearance, start, targets):
     """The largest clearance with which neighbours in a (rows, columns) array lead from `start` to one of `targets`; else 0."""
     for level in np.unique(clearance[clearance > 0])[::-1]:
@@ -176,3 +187,23 @@ def are_connected(problem, radius):
     reached = [part for part in shapely.get_parts(room) if part.distance(shapely.Point(problem.start[:2])) < 1e-9]
     goal = shapely.Point(problem.goal[:2])
     return any(part.distance(goal) <= problem.goal_tolerance_xy + 1e-9 for part in reached)
+
+
+def eikonal(passable, given):
+    """The costs of cells one apart where |grad cost| = 1 by first-order upwind differences; all fall at once, until none does.
+
+    Args:
+        passable: (rows, columns) bool, False all around the edge.
+        given: (rows, columns), the costs with which passable cells begin.
+    """
+    cost = np.where(passable, given, math.inf)
+    while True:
+        along, across = (np.minimum(np.roll(cost, 1, axis), np.roll(cost, -1, axis)) for axis in (1, 0))
+        low, high = np.minimum(along, across), np.maximum(along, across)
+        apart = np.ones(cost.shape)
+        np.subtract(high, low, out=apart, where=high < low + 1)
+        fallen = low + (apart + np.sqrt(2 - apart**2)) / 2
+        falls = passable & (fallen < cost - 1e-12)
+        if not falls.any():
+            return cost
+        cost[falls] = fallen[falls]

@@ -1,6 +1,7 @@
 """The contract that every planner meets: it answers each request with a path or a reason, within its limits."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from dubins_rrt_ros.planning import (
     plan,
     prepare,
 )
+from dubins_rrt_ros.planning.shortcut import shortened
 from dubins_rrt_ros.share import maps_directory
 
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
@@ -127,6 +129,32 @@ def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
     assert not result.cancelled
 
 
+def test_what_the_time_limit_cuts_short_is_shortened_and_told(monkeypatch):
+    """By a search with the samples that it took the same path is had again."""
+    problem, told = Problem(walled_with_a_gap(), VEHICLE, START, GOAL), []
+    with monkeypatch.context() as patched:
+        now = iter(np.arange(1e6) / 100)
+        patched.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
+        result = plan(problem, settings("rrt_star", samples=1_000_000, planning_time=2.5),
+                      on_progress=lambda progress: told.append(progress.length))
+    assert result.status == Status.NONE
+    assert result.samples < 1_000_000
+    assert told[-1] == result.length
+    assert result.length < result.tree.costs[(result.tree.poses == GOAL).all(axis=1)].min()
+    again = plan(problem, settings("rrt_star", samples=result.samples))
+    assert again.path == result.path
+
+
+def test_the_time_to_the_first_path_is_without_its_shortcuts(planner, monkeypatch):
+    def slowly(path, field, need):
+        time.sleep(0.05)
+        return shortened(path, field, need)
+
+    monkeypatch.setattr("dubins_rrt_ros.planning.rrt.shortened", slowly)
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, samples=200, goal_bias=0.5))
+    assert 0 < result.time_to_first < result.planning_time - 0.05
+
+
 def test_the_sample_budget_ends_it(planner):
     result = plan(hard_to_reach(), settings(planner, samples=200))
     assert_refused(result, Status.NO_VALID_PATH, "200 of 200 samples", "allow more samples")
@@ -229,7 +257,7 @@ def test_a_boxed_in_start_is_told(planner):
 
 
 @pytest.mark.parametrize("pose, by", [((-10.5, 0, 0), "0.50 m"), ((0, 10.01, 0), "0.01 m"), ((0, 10.0004, 0), "0.0004 m"),
-                                      ((13.0, -14.0, 0), "5.00 m"), ((1e9, 0, 0), "999999990.00 m")])
+                                      ((13.0, -14.0, 0), "5.00 m"), ((1e9, 0, 0), "1e+09 m")])
 def test_outside_the_map(planner, pose, by):
     words = (f"({pose[0]:g}, {pose[1]:g}) is {by} outside the map", "x -10.00 to 10.00 m", "y -10.00 to 10.00 m", "check the")
     result = plan(Problem(empty_map(), VEHICLE, pose, GOAL), settings(planner))
@@ -396,3 +424,9 @@ def test_the_numbers_of_the_statuses():
         "START_OCCUPIED": 205, "GOAL_OCCUPIED": 206, "TIMEOUT": 207,
         "NO_VALID_PATH": 208, "NO_MAP": 210, "NO_START": 211, "INVALID_POSE": 212,
         "CANCELLED": 213}
+
+
+def test_a_goal_that_is_never_drawn_is_told(planner):
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, goal_bias=0.0, samples=50))
+    assert result.status is Status.NO_VALID_PATH
+    assert "goal_bias 0" in result.message

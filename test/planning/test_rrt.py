@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
+from cases import SCALE, boxes_grid, empty_map, holed_polygons, needs_compiled, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Settings, Vehicle, load_map, rrt
 from dubins_rrt_ros.planning.dubins import shortest
@@ -27,6 +27,7 @@ def searched(problem, **options):
     lengths = []
     while not search.done:
         search.grow()
+        search.shorten(search.done)
         lengths.append(math.inf if search.length is None else search.length)
     return search, lengths
 
@@ -36,11 +37,12 @@ def open_field(**options):
 
 
 def contents(search):
-    return [getattr(search.tree, name).tobytes() for name in ARRAYS]
+    path = search.path.poses(0.1) if search.path else np.empty(0)
+    return [*(getattr(search.tree, name).tobytes() for name in ARRAYS), path.tobytes()]
 
 
 def test_rrt_ends_with_its_first_path():
-    search, lengths = searched(open_field(), planner="rrt")
+    search, lengths = searched(open_field(), planner="rrt", shortcut=False)
     assert search.samples < scaled(1500)
     assert sum(map(math.isfinite, lengths)) == 1
     assert search.length == search.tree.costs[search.best] == lengths[-1]
@@ -50,7 +52,7 @@ def test_rrt_ends_with_its_first_path():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rrt_star_never_gets_worse_and_uses_its_budget(maze, seed):
-    search, lengths = searched(maze, seed=seed)
+    search, lengths = searched(maze, seed=seed, shortcut=False)
     assert search.samples == scaled(1500)
     assert (np.diff(np.array(lengths)[np.isfinite(lengths)]) <= 0).all()
     if SCALE == 1:
@@ -90,6 +92,33 @@ def test_a_seed_determines_every_byte(planner, kind, maze, monkeypatch):
     assert contents(different) != contents(once)
 
 
+def test_rrt_shortens_its_one_path():
+    plain, _ = searched(open_field(), planner="rrt", shortcut=False)
+    search, lengths = searched(open_field(), planner="rrt")
+    assert contents(search)[:-1] == contents(plain)[:-1]
+    assert search.path.length == search.length == min(lengths) < plain.length
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+def test_shortcuts_leave_the_tree_as_it_is(planner, maze):
+    search, _ = searched(maze, planner=planner, informed=False)
+    plain, _ = searched(maze, planner=planner, informed=False, shortcut=False)
+    assert contents(search)[:-1] == contents(plain)[:-1]
+    if plain.path:
+        assert plain.path == plain.tree.path_to(plain.best)
+        assert search.length == search.path.length <= plain.length == plain.path.length
+
+
+@needs_compiled
+def test_informed_samples_give_shorter_paths():
+    """About half as far above the shortest."""
+    least = shortest((-8, -8, 0), (8, 8, 1), 0.5).length
+    above = {informed: np.mean([
+        searched(open_field(), seed=seed, step_size=2.0, informed=informed, shortcut=False)[0].length - least
+        for seed in range(5)]) for informed in (True, False)}
+    assert above[True] < 0.7 * above[False]
+
+
 def test_a_smaller_budget_is_the_beginning_of_a_larger_one(maze, monkeypatch):
     """So a plan that was cut short can be had again with the samples that it took."""
     monkeypatch.setattr(rrt, "BATCH_TIME", 1e-9)  # batches of one sample
@@ -98,6 +127,7 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one(maze, monkeypatch):
     whole = Search(maze, Settings(samples=10 * count, seed=1), ClearanceField.of(maze.map))
     while whole.samples < count:
         whole.grow()
+        whole.shorten(whole.samples == count)
     assert whole.samples == count
     assert contents(whole) == contents(part)
 
@@ -185,7 +215,7 @@ def test_with_nothing_but_the_goal_drawn_and_a_step_the_tree_is_a_line_of_steps(
 
 def test_the_best_node_is_the_cheapest_within_the_tolerance():
     problem = open_field(goal_tolerance_xy=1.0, goal_tolerance_yaw=0.5)
-    search, _ = searched(problem)
+    search, _ = searched(problem, shortcut=False)
     tree = search.tree
     within = (np.hypot(*(tree.poses[:, :2] - (8, 8)).T) <= 1) & (np.abs(tree.poses[:, 2] - 1) <= 0.5)
     assert within[search.best]
