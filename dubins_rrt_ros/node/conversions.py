@@ -21,9 +21,9 @@ from dubins_rrt_ros.planning.problem import Pose
 NORM_TOLERANCE = 1e-3
 #: How far a pose's z axis may lean [rad].
 TILT_TOLERANCE = 0.01
-#: The cells of a polygon map that is published as a grid, to be looked at:
-#: how small [m], and how many at most; that many take about 2 s.
-RASTER_RESOLUTION, RASTER_CELLS = 0.05, 500_000
+#: The cells of a polygon map that is published as a grid, to be looked at: how small [m], and how many at most; that many
+#: take a second between simple polygons, and five between thousands of round ones.
+RASTER_RESOLUTION, RASTER_CELLS = 0.05, 200_000
 
 
 def bare_pose(message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> PoseMessage:
@@ -181,7 +181,7 @@ def status_message(node: str, status: Status, message: str, *, plan_id: int = 0,
     """
     values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
     values |= _figures(plan) | {"map_id": map_id}
-    return DiagnosticStatus(level=_level(status, plan), name=f"{node}: planner", message=message,
+    return DiagnosticStatus(level=_level(status, plan, plan_id), name=f"{node}: planner", message=message,
                             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()])
 
 
@@ -203,10 +203,10 @@ def _text(value: object) -> str:
     return repr(float(value)) if isinstance(value, float) else str(value)
 
 
-def _level(status: Status, plan: Plan | None) -> bytes:
+def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
     if status is Status.NO_MAP:
         return DiagnosticStatus.STALE
-    if status is Status.CANCELLED:
+    if status is Status.CANCELLED or (status is Status.NO_START and plan_id == 0):  # a start that no goal waits for yet
         return DiagnosticStatus.WARN
     if status is not Status.NONE:
         return DiagnosticStatus.ERROR

@@ -1,11 +1,12 @@
 """The node's process: arguments, signals, exit status."""
 
 import argparse
+import contextlib
 import signal
 import sys
 
 import rclpy
-from rclpy.exceptions import NameValidationException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.utilities import remove_ros_args
 
@@ -25,7 +26,16 @@ class ConfigurationError(Exception):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit status is 1 where its configuration cannot be used."""
-    arguments = sys.argv if args is None else args
+    try:
+        return _run(sys.argv if args is None else args)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0  # SIGINT and SIGTERM are how it ends, also while something is published, which then fails
+    except ConfigurationError as error:
+        print(f"planner: {error}", file=sys.stderr)
+        return 1
+
+
+def _run(arguments: list[str]) -> int:
     node = executor = None
     try:
         if _parse(arguments).print_parameters:
@@ -35,14 +45,6 @@ def main(args: list[str] | None = None) -> int:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         _spin(executor, node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # SIGINT and SIGTERM are how it ends
-    except ConfigurationError as error:
-        print(f"planner: {error}", file=sys.stderr)
-        return 1
-    except Exception:
-        if rclpy.ok():  # else a signal came while something was published, which then fails
-            raise
     finally:
         # A second signal must not break off the end.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -51,7 +53,8 @@ def main(args: list[str] | None = None) -> int:
             node.close()
         if executor is not None:
             executor.shutdown()  # left to the garbage collector, it may come after what it refers to, with a traceback
-        rclpy.try_shutdown()
+        with contextlib.suppress(RuntimeError):  # the signal's own thread may be first
+            rclpy.try_shutdown()
     return 0
 
 
@@ -63,8 +66,8 @@ def _spin(executor: SingleThreadedExecutor, node: PlannerNode) -> None:
         except ExternalShutdownException:
             raise
         except Exception as error:  # of any kind: the node lives on
-            if not rclpy.ok():
-                raise
+            if not rclpy.ok():  # a signal came while something was published, which then fails
+                raise ExternalShutdownException from error
             node.tell_defect(error)
 
 
@@ -75,8 +78,14 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
         raise ConfigurationError(_one_line(error)) from error
     try:
         node = PlannerNode()
-    except (OptionError, MapError, NameValidationException) as error:
+    except MapError as error:
+        raise ConfigurationError(f"map_file: {error}") from error
+    except (OptionError, NameValidationException, ParameterException) as error:
         raise ConfigurationError(_one_line(error)) from error
+    except Exception as error:
+        if not rclpy.ok():  # a signal came meanwhile
+            raise ExternalShutdownException from error
+        raise
     for warning in unused_files(arguments, node.get_fully_qualified_name()):
         node.get_logger().warning(warning)
     return node

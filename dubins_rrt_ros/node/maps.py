@@ -1,39 +1,55 @@
 """The map that is planned on: from a file, from the topic, or by service."""
 
+import queue
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 
-from dubins_rrt_ros.planning import GridMap, Map, MapError, MapMetadataError, MapNotFound, load_map, prepare
+from dubins_rrt_ros.planning import GridMap, Map, MapError, MapMetadataError, MapNotFound, Vehicle, load_map, prepare
 from dubins_rrt_ros.share import find_map
 
 from .conversions import as_grid, grid_from, grid_message
 from .mailbox import Mailbox
-from .parameters import Configuration, NodeOptions, Parameters
+from .parameters import NodeOptions, Parameters
 from .qos import LATCHED, VOLATILE, misfits
 from .worker import Worker
+
+#: How long a signal may go unnoticed while the first map is loaded, and how often it is said that it still is [s].
+LOADING_INTERVAL, WAITING_INTERVAL = 0.25, 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class MapInUse:
-    """A map that is planned on.
-
-    Attributes:
-        map: the map.
-        grid: the same as a grid, as it is published.
-        prepared: set once what plan() needs of it is computed.
-    """
+    """A map that is planned on: the map, and the same as a grid, as it is published."""
 
     map: Map
     grid: GridMap
-    prepared: threading.Event
+
+
+@dataclass(eq=False)
+class Preparation:
+    """What plan() needs of a map, for one vehicle.
+
+    Attributes:
+        map, robot_radius, allow_unknown: what it is for.
+        done: set when it is computed.
+        is_wanted: whether a request waits for it, which it does not any more once there is a newer map.
+    """
+
+    map: Map
+    robot_radius: float
+    allow_unknown: bool
+    done: threading.Event
+    is_wanted: bool = False
 
 
 class Maps:
@@ -58,10 +74,11 @@ class Maps:
         self._refused = ""  # why the last one was refused
         self.worker = Worker("maps")
         self.current: MapInUse | None = None
+        self._preparation: Preparation | None = None
         self._publisher = None
         if self._options.map_file:
             self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED)
-            self._take(*self._load(self._options.map_file))
+            self._take(*self._load_first(self._options.map_file))
         else:
             qos = LATCHED if self._options.map_transient_local else VOLATILE
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
@@ -85,6 +102,33 @@ class Maps:
         remedy = " and ".join(found) or "publish it, set map_file or call ~/load_map"
         return f"There is no map yet, waiting for one on {topic}: {remedy}.{self._refused}"
 
+    @property
+    def is_prepared(self) -> bool:
+        """Whether requests can be planned on the current map without delay."""
+        return self.current is not None and self.prepared().done.is_set()
+
+    def prepared(self) -> Preparation:
+        """The preparation of the current map for the present vehicle, begun if it was not."""
+        now = self._parameters.read()
+        wanted = self.current.map, now.vehicle.robot_radius, now.problem["allow_unknown"]
+        last = self._preparation
+        if last is None or (last.map, last.robot_radius, last.allow_unknown) != wanted:
+            self._preparation = Preparation(*wanted, threading.Event())
+            self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
+        return self._preparation
+
+    def _load_first(self, name: str) -> tuple[Map, GridMap]:
+        """Load the map that the node begins with; a signal ends the wait for it."""
+        loaded: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.worker.submit(lambda cancelled: self._load(name), loaded.put)
+        while (outcome := _within(LOADING_INTERVAL, loaded)) is None:
+            if not self._node.context.ok():
+                raise ExternalShutdownException
+            self._node.get_logger().info(f"Still loading the map {name}", throttle_duration_sec=WAITING_INTERVAL)
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
+
     def _load(self, name: str) -> tuple[Map, GridMap]:
         loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells)
         return loaded, as_grid(loaded)
@@ -104,28 +148,28 @@ class Maps:
 
     def _take(self, taken: Map, grid: GridMap) -> None:
         """Plan on this from now on."""
-        self.current = MapInUse(taken, grid, threading.Event())
+        self.current = MapInUse(taken, grid)
         self._refused = ""
         height, width = grid.data.shape
         self._node.get_logger().info(f"Took a map of {width} x {height} cells: {taken.name}")
-        job = partial(self._prepare, self.current, self._parameters.read())
-        self.worker.submit(job, partial(self._post, self._on_prepared))
+        self.prepared()
         if self._publisher is not None:
             self._publisher.publish(self._message(grid))
         self._mailbox.post(self._on_news)
 
-    def _prepare(self, used: MapInUse, now: Configuration, cancelled: Callable[[], bool]) -> MapInUse:
+    def _prepare(self, preparation: Preparation, vehicle: Vehicle, cancelled: Callable[[], bool]) -> Preparation:
         try:
-            if used is self.current and not cancelled():  # else there is a newer one already
-                prepare(used.map, now.vehicle, now.problem["allow_unknown"])
+            if preparation.is_wanted or preparation.map is self.current.map:
+                preparation.map.id  # noqa: B018 - of a large map it takes long, and is kept
+                prepare(preparation.map, vehicle, preparation.allow_unknown)
         finally:
-            used.prepared.set()  # also where it failed, which plan() then says of the request
-        return used
+            preparation.done.set()  # also where it failed, which plan() then says of the request
+        return preparation
 
-    def _on_prepared(self, outcome: MapInUse | Exception) -> None:
+    def _on_prepared(self, outcome: Preparation | Exception) -> None:
         if isinstance(outcome, Exception):
             raise outcome
-        if outcome is self.current:
+        if outcome is self._preparation:
             self._node.get_logger().info(f"The map is ready, id {outcome.map.id}")
             self._tell_prepared()
 
@@ -156,6 +200,14 @@ class Maps:
 
     def _message(self, grid: GridMap) -> OccupancyGrid:
         return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
+
+
+def _within(timeout: float, results: queue.SimpleQueue) -> Any:
+    """What comes within `timeout` [s], or None."""
+    try:
+        return results.get(timeout=timeout)
+    except queue.Empty:
+        return None
 
 
 def _result(outcome: object) -> int:

@@ -39,7 +39,7 @@ def tree_markers(plan: Plan | None, frame: str, stamp: Time, most: int) -> Marke
         if plan.culprit is not None:
             markers.append(_disc(header, "culprit", plan.culprit, 0.3 * radius, CULPRIT_COLOR))
         if plan.path is not None:
-            poses = plan.path.poses(min(plan.settings.path_spacing, CHORD * radius))
+            poses = plan.path.poses(CHORD * radius)
             markers += _lines(header, "path", Marker.LINE_STRIP, poses[:, :2], 3 * width, PATH_COLOR)
     return MarkerArray(markers=markers)
 

@@ -20,11 +20,11 @@ from .qos import LATCHED
 
 #: How often the last status is repeated on /diagnostics [s].
 DIAGNOSTICS_INTERVAL = 1.0
-#: The tree of a path that is still improved is shown at most once in this time [s], and with so many lines at most: they
-#: are built while the node answers nobody, a thousand in 3 ms.
-TREE_INTERVAL, GROWING_TREE = 1.0, 4_000
+#: The tree of a path that is still improved is shown at most once in this time [s], and with so many lines at most; while
+#: they are built and sent, which takes 10 ms a thousand, the node answers nobody.
+TREE_INTERVAL, GROWING_TREE = 1.0, 2_000
 #: The most lines of a tree whose request has ended.
-FINAL_TREE = 50_000
+FINAL_TREE = 10_000
 
 
 class Outputs:
@@ -32,7 +32,7 @@ class Outputs:
 
     Attributes:
         shown: the plan whose path and tree are on display, if there is one.
-        status: how the last event that was told ended, if there was one.
+        tells_of_no_request: whether the last status is about a map or a start that is missing or was refused.
     """
 
     def __init__(self, node: Node, parameters: Parameters, frame: str):
@@ -48,7 +48,7 @@ class Outputs:
         self._told: DiagnosticStatus | None = None
         self._timer = node.create_timer(DIAGNOSTICS_INTERVAL, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.shown: Plan | None = None
-        self.status: Status | None = None
+        self.tells_of_no_request = False
         self._tree_due = 0.0
         self._tree_is_clear = True
 
@@ -61,8 +61,9 @@ class Outputs:
             self._show_tree(FINAL_TREE if last else GROWING_TREE)
 
     def withdraw(self) -> None:
-        """Publish an empty path in place of the one that is shown."""
+        """Publish an empty path in place of the one that is shown, and clear its tree."""
         self._show_path(None)
+        self._show_tree(FINAL_TREE)
 
     def _show_path(self, plan: Plan | None) -> None:
         self.shown = plan
@@ -74,8 +75,8 @@ class Outputs:
 
     def tell(self, status: Status, message: str, plan: Plan | None = None, *, last: bool = True, plan_id: int = 0,
              revision: int = 0, map_id: str = "") -> None:
-        """Publish an event as status; one that is the last of a request is logged too."""
-        self.status = status
+        """Publish an event as status; the `last` of a request is logged too."""
+        self.tells_of_no_request = plan_id == 0 or status is Status.NO_MAP
         self._told = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
                                     map_id=map_id if plan is None else plan.problem.map.id)
         self._status.publish(self._told)

@@ -59,7 +59,7 @@ class PlannerNode(Node):
         self._plan_id = 0  # of the newest request
         self._goal_id = 0  # of the newest goal; what bears an older id is not published
         self._revision = 0
-        self._goal: PoseStamped | None = None  # the newest
+        self._goal: PoseStamped | None = None  # the newest, unless it was cancelled
         self._is_planning = False  # to that goal
         self._waiting_for = ""  # as it was told last
         self._ends: dict[int, Future] = {}  # of the requests under way, by plan_id
@@ -106,14 +106,14 @@ class PlannerNode(Node):
             self._log_waiting()
 
     def _note_waiting(self) -> bool:
-        """Log what is waited for where that is another thing than before; the status tells of a map that is not there."""
+        """Log what is waited for where that is another thing than before, and mend a status about that."""
         before, self._waiting_for = self._waiting_for, self._missing()
         if self._waiting_for == before:
             return False
         self._log_waiting()
         if self._maps.current is None:
             self._outputs.tell(Status.NO_MAP, self._waiting_for, last=False)
-        elif self._outputs.status is Status.NO_MAP:
+        elif self._outputs.tells_of_no_request:
             status = Status.NO_START if self._waiting_for else Status.NONE
             self._outputs.tell(status, self._waiting_for or "Ready for a goal.", last=False, map_id=self._maps.id)
         return True
@@ -146,9 +146,10 @@ class PlannerNode(Node):
     def _refuse_start(self, status: Status, message: str) -> None:
         """Forget the start before too: the vehicle is no longer there."""
         self._start = None
-        self._refused_start = f" The last one was refused: {message}"
+        before, self._refused_start = self._refused_start, f" The last one was refused: {message}"
         self._waiting_for = self._missing()
-        self._outputs.tell(status, message, map_id=self._maps.id)
+        # A stream of them shall not flood the log.
+        self._outputs.tell(status, message, last=self._refused_start != before, map_id=self._maps.id)
 
     def _on_goal(self, message: PoseStamped) -> None:
         self._begin(message)
@@ -176,15 +177,19 @@ class PlannerNode(Node):
             if self._maps.current is None:
                 raise Refusal(Status.NO_MAP, self._maps.missing())
             if self._start is None:
-                raise Refusal(Status.NO_START, f"A goal came before any start: {self._no_start()}")
+                raise Refusal(Status.NO_START, f"There is no start to plan from: {self._no_start()}")
             request = self._request(self._goal_id, self._start, self._frames.pose("goal", self._goal))
+            if not request.prepared.is_set():
+                self.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
             self._is_planning = True
             self._submit(self._goal_worker, request, self._end_goal, self._improve_goal)
 
     def _request(self, plan_id: int, start: Pose, goal: Pose, **wanted: Any) -> Request:
         now, used = self._configured.read(), self._maps.current
         problem = Problem(used.map, now.vehicle, start, goal, **{**now.problem, **wanted})
-        return Request(plan_id, problem, now.settings, used.prepared)
+        preparation = self._maps.prepared()
+        preparation.is_wanted = True
+        return Request(plan_id, problem, now.settings, preparation.done)
 
     def _submit(self, worker: Worker, request: Request, ended: Callable, improved: Callable | None = None) -> Future:
         """Have a request served; the future's result, which `ended` is called with too, says how it ended."""
@@ -225,7 +230,7 @@ class PlannerNode(Node):
         """See whether the published path is free on a map that came after it, where that is wanted."""
         shown, used = self._outputs.shown, self._maps.current
         if (self._is_planning or shown is None or shown.path is None or used is None or shown.problem.map is used.map
-                or not used.prepared.is_set() or not self._configured.read().node.replan_on_map_change):
+                or not self._maps.is_prepared or not self._configured.read().node.replan_on_map_change):
             return
         problem = replace(shown.problem, map=used.map)
         self._maps.worker.submit(lambda cancelled: audit(shown.path, problem),
@@ -239,11 +244,15 @@ class PlannerNode(Node):
         if outcome.ok:
             self.get_logger().info("The map changed; the published path is free on it too")
             return
-        self.get_logger().warning(f"The map changed, and the published path is not free on it: {'; '.join(outcome.findings)}. "
-                                  "It is withdrawn, and planned again")
-        self._begin(self._goal)
-        self._outputs.withdraw()
-        self._plan()
+        message = f"The map changed, and the published path is not free on it: {'; '.join(outcome.findings)}. It is withdrawn"
+        if not self._grace.is_canceled():  # a newer goal waits for a start
+            self._outputs.withdraw()
+        elif self._goal is None:
+            self._answer(Status.NO_VALID_PATH, f"{message}; its goal was cancelled, so that nothing is planned.")
+        else:
+            self._answer(Status.NO_VALID_PATH, f"{message}, and planned again.")
+            self._begin(self._goal)
+            self._plan()
 
     # Services
 
@@ -276,6 +285,7 @@ class PlannerNode(Node):
             messages.append("Cancelled before a first path: the goal waited for a start.")
             self._answer(Status.CANCELLED, messages[0])
         ends = list(self._ends.values())
+        self._goal = None  # a changed map does not bring it back
         self._goal_worker.cancel()
         self._service_worker.cancel()
         messages += [(await end)[1] for end in ends]

@@ -49,10 +49,14 @@ class Worker:
 
     def _run(self) -> None:
         while self._wait():
-            job, done, cancelled = self._jobs[0]
-            done(_outcome(job, cancelled))
+            self._do_next()
             with self._state:
                 self._jobs.popleft()
+
+    def _do_next(self) -> None:
+        # In a frame of its own: while the worker waits, nothing keeps the last job's map alive.
+        job, done, cancelled = self._jobs[0]
+        done(_outcome(job, cancelled))
 
     def _wait(self) -> bool:
         """Wait for a job; False at the end."""

@@ -272,10 +272,14 @@ def test_the_status_of_a_failure_has_all_keys_and_is_an_error(over_the_wire, pla
     (Status.INVALID_POSE, DiagnosticStatus.ERROR), (Status.CANCELLED, DiagnosticStatus.WARN),
 ])
 def test_the_level_follows_from_the_status(over_the_wire, status, level):
-    message = over_the_wire(status_message("/planner", status, "A sentence."))
+    message = over_the_wire(status_message("/planner", status, "A sentence.", plan_id=1))
     assert message.level == level
     assert list(values(message)) == KEYS
     assert values(message)["error_name"] == status.name
+
+
+def test_a_start_that_no_goal_waits_for_is_no_error(over_the_wire):
+    assert over_the_wire(status_message("/planner", Status.NO_START, "A sentence.")).level == DiagnosticStatus.WARN
 
 
 def test_an_approximate_or_cancelled_path_is_a_warning(plans):

@@ -124,6 +124,17 @@ def test_a_path_that_a_new_map_blocks_is_withdrawn_and_planned_again(replanning)
     assert path[-1] == pytest.approx(GOAL, abs=1e-9)
 
 
+def test_a_cancelled_goal_s_path_is_withdrawn_and_not_planned_again(replanning):
+    process, client = replanning
+    plan_id = show_path(client, process)
+    assert client.call(Trigger, "cancel").success
+    publish(client, process, DETOUR)
+    assert "its goal was cancelled" in client.status_of(plan_id, error_name="NO_VALID_PATH")["message"]
+    client.wait_for(lambda: not client.paths[-1].poses, "the empty path")
+    publish(client, process, FREE)
+    assert end_of_goal(client) == plan_id + 1
+
+
 def test_a_path_that_a_new_map_leaves_free_is_left_alone(replanning):
     process, client = replanning
     show_path(client, process)
@@ -174,7 +185,10 @@ def test_a_map_that_changes_during_a_request_is_checked_when_it_ends(replanning)
     publish(client, process, DETOUR)
     told = client.status_of(plan_id + 1, error_name="NONE")
     assert told["map_id"] == id_of(DETOUR)
-    assert {told["map_id"] for told in statuses_of(client, plan_id)} == {id_of(FREE)}
+    *planned, withdrawn = statuses_of(client, plan_id)
+    assert {(told["error_name"], told["map_id"]) for told in planned} == {("NONE", id_of(FREE))}
+    assert (withdrawn["error_name"], withdrawn["map_id"]) == ("NO_VALID_PATH", id_of(DETOUR))
+    assert "the published path is not free on it" in process.output
     wait_for_path_around(client, DETOUR)
 
 

@@ -73,7 +73,8 @@ def test_an_unknown_argument_ends_it_with_the_usage(planners, arguments):
     ({"wheelbase": 2.0}, ["wheelbase is 2 m", "set both"]), ({"max_steering_angle": 0.5}, ["0.5 rad", "set both"]),
     ({"wheelbase": 1000.0, "max_steering_angle": 0.001}, ["turning_radius is", "to 10000"]),
     ({"global_frame": ""}, ["global_frame is ''", "give the name"]), ({"max_map_cells": 0}, ["max_map_cells is 0", "from 1"]),
-    ({"map_file": "nowhere.yaml"}, ["nowhere.yaml", "no such map file", "maze.yaml"]),
+    ({"use_sim_time": "abc"}, ["use_sim_time"]),
+    ({"map_file": "nowhere.yaml"}, ["map_file", "nowhere.yaml", "no such map file", "maze.yaml"]),
     ({"map_file": "http://example.org/maze.yaml"}, ["http://", "file://"]),
     ({"map_file": "maze", "max_map_cells": 100}, ["maze", "max_map_cells = 100", "crop it"]),
 ])
@@ -191,6 +192,12 @@ def serves_requests(planners, map_yaml, noise_yaml):
         client.request_plan(START, GOAL)
     for _ in range(3):
         client.call(GetParameters, "get_parameters", names=["samples"])
+    return process
+
+
+def loads_its_map_file(planners, map_yaml, noise_yaml):
+    process = planners.start(map_file=str(noise_yaml))
+    process.wait_until_ready()
     return process
 
 

@@ -103,7 +103,11 @@ def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the
     client.send("goal_pose", GOAL)
     told = client.status_of(1, error_name="NO_START")
     assert "start_pose" in told["message"] and "finite" in told["message"]
+    client.statuses.clear()
+    client.send("start_pose", (math.inf, 5.0, 0.0))
+    client.status_of(0, error_name="INVALID_POSE")
     client.send("start_pose", START)
+    assert client.status_of(0, error_name="NONE")["message"] == "Ready for a goal."
     client.send("goal_pose", GOAL)
     assert client.status_of(2, samples="300")["error_name"] == "NONE"
 
