@@ -20,7 +20,7 @@ from dubins_rrt_ros.share import find_map
 from .conversions import as_grid, grid_from, grid_message
 from .mailbox import Mailbox
 from .parameters import NodeOptions, Parameters
-from .qos import LATCHED, VOLATILE, misfits
+from .qos import LATCHED, VOLATILE, map_misfits
 from .worker import Worker
 
 #: How long a signal may go unnoticed while the first map is loaded, and how often it is said that it still is [s].
@@ -97,8 +97,7 @@ class Maps:
     def missing(self) -> str:
         """Where there is no map yet: on what it waits, why none comes, and what to do."""
         topic = self._node.resolve_topic_name("map")
-        found = misfits(self._node.get_publishers_info_by_topic(topic), "nav_msgs/msg/OccupancyGrid",
-                        self._options.map_transient_local)
+        found = map_misfits(self._node.get_publishers_info_by_topic(topic), self._options.map_transient_local)
         remedy = " and ".join(found) or "publish it, set map_file or call ~/load_map"
         return f"There is no map yet, waiting for one on {topic}: {remedy}.{self._refused}"
 

@@ -32,7 +32,8 @@ class Outputs:
 
     Attributes:
         shown: the plan whose path and tree are on display, if there is one.
-        tells_of_no_request: whether the last status is about a map or a start that is missing or was refused.
+        status: what was told last, if anything was.
+        tells_of_no_request: whether that was about a map or a start that is missing or was refused.
     """
 
     def __init__(self, node: Node, parameters: Parameters, frame: str):
@@ -48,6 +49,7 @@ class Outputs:
         self._told: DiagnosticStatus | None = None
         self._timer = node.create_timer(DIAGNOSTICS_INTERVAL, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.shown: Plan | None = None
+        self.status: Status | None = None
         self.tells_of_no_request = False
         self._tree_due = 0.0
         self._tree_is_clear = True
@@ -76,7 +78,8 @@ class Outputs:
     def tell(self, status: Status, message: str, plan: Plan | None = None, *, last: bool = True, plan_id: int = 0,
              revision: int = 0, map_id: str = "") -> None:
         """Publish an event as status; the `last` of a request is logged too."""
-        self.tells_of_no_request = plan_id == 0 or status is Status.NO_MAP
+        self.status = status
+        self.tells_of_no_request = status is Status.NO_MAP or (plan_id == 0 and status is not Status.NONE)
         self._told = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
                                     map_id=map_id if plan is None else plan.problem.map.id)
         self._status.publish(self._told)

@@ -25,7 +25,7 @@ from .mailbox import Mailbox
 from .maps import MapInUse, Maps
 from .outputs import Outputs
 from .parameters import Parameters
-from .qos import VOLATILE
+from .qos import VOLATILE, misfits
 from .request import Refusal, Request
 from .worker import Worker
 
@@ -102,20 +102,28 @@ class PlannerNode(Node):
     # What is waited for
 
     def _keep_explaining(self) -> None:
+        """Log again what is waited for, if anything is."""
         if not self._note_waiting():
             self._log_waiting()
+        if self._maps.current is not None and not self._is_planning and self._grace.is_canceled():
+            self._mend_status()
+
+    def _mend_status(self) -> None:
+        """Say so where the last status misses a map or a start that has come since. Not at once: a goal mostly comes with it."""
+        told = self._outputs
+        if told.status is Status.NO_MAP and self._waiting_for:
+            told.tell(Status.NO_START, self._waiting_for, last=False, map_id=self._maps.id)
+        elif told.tells_of_no_request and not self._waiting_for:
+            told.tell(Status.NONE, "Ready for a goal.", last=False, map_id=self._maps.id)
 
     def _note_waiting(self) -> bool:
-        """Log what is waited for where that is another thing than before, and mend a status about that."""
+        """Log what is waited for where that is another thing than before; where it is a map, the status tells it too."""
         before, self._waiting_for = self._waiting_for, self._missing()
         if self._waiting_for == before:
             return False
         self._log_waiting()
         if self._maps.current is None:
             self._outputs.tell(Status.NO_MAP, self._waiting_for, last=False)
-        elif self._outputs.tells_of_no_request:
-            status = Status.NO_START if self._waiting_for else Status.NONE
-            self._outputs.tell(status, self._waiting_for or "Ready for a goal.", last=False, map_id=self._maps.id)
         return True
 
     def _log_waiting(self) -> None:
@@ -130,8 +138,12 @@ class PlannerNode(Node):
         return f"Waiting for a start: {self._no_start()}" if self._start is None else ""
 
     def _no_start(self) -> str:
-        topics = " or ".join(map(self.resolve_topic_name, ("start_pose", "initialpose")))
-        return f"publish the vehicle's pose on {topics}.{self._refused_start}"
+        topics = [self.resolve_topic_name(name) for name in ("start_pose", "initialpose")]
+        kinds = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+        found = [why for topic, kind in zip(topics, kinds, strict=True)
+                 for why in misfits(self.get_publishers_info_by_topic(topic), kind)]
+        but = f"; but {' and '.join(found)}" if found else ""
+        return f"publish the vehicle's pose on {' or '.join(topics)}{but}.{self._refused_start}"
 
     # What comes in
 

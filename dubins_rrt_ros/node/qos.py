@@ -1,6 +1,6 @@
 """The quality of service of the node's topics, and what does not fit it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -9,23 +9,36 @@ VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durabilit
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def misfits(publishers: Iterable[TopicEndpointInfo], kind: str, transient_local: bool) -> list[str]:
-    """Why nothing comes from the publishers of the map's topic, a clause with its remedy for each that does not fit.
+def misfits(publishers: Iterable[TopicEndpointInfo], kind: str) -> list[str]:
+    """Why nothing comes from the publishers of a topic, a clause with its remedy for each that does not fit.
 
     Args:
         publishers: all that there are.
-        kind: the topic's type, such as nav_msgs/msg/OccupancyGrid.
-        transient_local: the durability that is asked for, by the parameter map_transient_local.
+        kind: the topic's type, such as geometry_msgs/msg/PoseStamped.
     """
-    return [f"{_name(publisher)} {why}" for publisher in publishers if (why := _misfit(publisher, kind, transient_local))]
+    return _clauses(publishers, lambda publisher: _misfit(publisher, kind))
 
 
-def _misfit(publisher: TopicEndpointInfo, kind: str, transient_local: bool) -> str:
-    offered = publisher.qos_profile
+def map_misfits(publishers: Iterable[TopicEndpointInfo], transient_local: bool) -> list[str]:
+    """The same for the map's topic, where `transient_local` tells what durability the parameter map_transient_local asks for."""
+    return _clauses(publishers, lambda publisher: _misfit(publisher, "nav_msgs/msg/OccupancyGrid")
+                    or _durability_misfit(publisher, transient_local))
+
+
+def _clauses(publishers: Iterable[TopicEndpointInfo], misfit: Callable[[TopicEndpointInfo], str]) -> list[str]:
+    return [f"{_name(publisher)} {why}" for publisher in publishers if (why := misfit(publisher))]
+
+
+def _misfit(publisher: TopicEndpointInfo, kind: str) -> str:
     if publisher.topic_type != kind:
         return f"publishes {publisher.topic_type} there, not {kind}; give one of them another name"
-    if offered.reliability == ReliabilityPolicy.BEST_EFFORT:
+    if publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT:
         return "offers it with best-effort reliability, which does not fit; publish it reliably"
+    return ""
+
+
+def _durability_misfit(publisher: TopicEndpointInfo, transient_local: bool) -> str:
+    offered = publisher.qos_profile
     if transient_local and offered.durability == DurabilityPolicy.VOLATILE:
         return "offers it with volatile durability, which does not fit; set map_transient_local to false"
     if not transient_local and offered.durability == DurabilityPolicy.TRANSIENT_LOCAL:

@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from harness import occupancy, values_of
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -35,7 +36,8 @@ MISFITS = {
 def waiting(module_planners, tmp_path_factory):
     """Planners that wait, and their clients, all at the same time as some of it takes 5 s.
 
-    By name: those of MISFITS with the publisher that does not fit; `no map` and `no start`, which lack nothing else.
+    By name: those of MISFITS with the publisher that does not fit; `no map` and `no start`, which lack nothing else; and
+    `unheard start`, with a start's publisher that does not fit.
     """
     found = {}
     for name, (kind, qos, transient_local, _) in MISFITS.items():
@@ -47,6 +49,8 @@ def waiting(module_planners, tmp_path_factory):
     save_map(GridMap(FREE, 0.1), file)
     for name, parameters in {"no map": {}, "no start": {"map_file": str(file)}}.items():
         found[name] = module_planners.start(**parameters, **QUICK), module_planners.client()
+    found["unheard start"] = module_planners.start(map_file=str(file)), module_planners.client()
+    found["unheard start"][1].node.create_publisher(PoseStamped, "start_pose", BEST_EFFORT)
     return found
 
 
@@ -96,6 +100,12 @@ def test_the_topics_of_a_start_are_named_in_the_log(waiting):
     assert "no map" not in process.output
 
 
+def test_a_publisher_of_starts_that_does_not_fit_is_named_with_the_remedy(waiting):
+    process, client = waiting["unheard start"]
+    client.wait_for_word(f"{client.node.get_fully_qualified_name()} offers it with best-effort reliability")
+    assert "publish it reliably" in process.output
+
+
 def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the_wait(waiting):
     _, client = waiting["no start"]
     client.send("start_pose", (math.nan, 5.0, 0.0))
@@ -108,6 +118,7 @@ def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the
     client.status_of(0, error_name="INVALID_POSE")
     client.send("start_pose", START)
     assert client.status_of(0, error_name="NONE")["message"] == "Ready for a goal."
+    client.statuses.clear()
     client.send("goal_pose", GOAL)
     assert client.status_of(2, samples="300")["error_name"] == "NONE"
 
@@ -130,11 +141,11 @@ def test_once_a_map_came_the_status_is_no_longer_that_there_is_none(nothing_know
         client.status_of(1, error_name="NO_MAP")
     client.publish_map(occupancy(FREE))
     client.wait_for_word("The map is ready")
-    heard = len(client.diagnostics)
-    client.wait_for(lambda: len(client.diagnostics) > heard + 1, "two diagnostics after it")
-    assert values_of(client.diagnostics[-1])["error_name"] != "NO_MAP"
-    assert client.statuses[-1].level != DiagnosticStatus.STALE
-    assert values_of(client.statuses[-1])["map_id"]
+    name = "NONE" if has_start else "NO_START"
+    told = client.status_of(0, error_name=name)
+    assert told["level"] == (DiagnosticStatus.OK if has_start else DiagnosticStatus.WARN)
+    assert told["map_id"]
+    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == name, "a diagnostic that says so too")
 
 
 def test_a_goal_that_came_before_the_map_is_not_planned_when_it_comes(nothing_known):
