@@ -1,31 +1,24 @@
 """The contract that every planner meets: it answers each request with a path or a reason, within its limits."""
 
 import math
-import time
 
 import numpy as np
 import pytest
 import shapely
 from cases import empty_map, needs_compiled, scaled
+from planner_cases import GOAL, START, VEHICLE, assert_refused, settings, walled
 
 from dubins_rrt_ros.planning import (
     GridMap,
     PolygonMap,
     Problem,
-    Settings,
     Status,
-    Tree,
     Vehicle,
     audit,
     load_map,
     plan,
-    prepare,
 )
-from dubins_rrt_ros.planning.shortcut import shortened
 from dubins_rrt_ros.share import maps_directory
-
-START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
-VEHICLE = Vehicle(0.5, 0.2)
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -37,37 +30,6 @@ def planner(request):
 def maze(request):
     map = load_map(maps_directory() / f"maze.{request.param}")
     return Problem(map, Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
-
-
-def settings(planner, **options):
-    budget = {"samples": scaled(3000, least=300), "planning_time": 60.0}
-    return Settings(**{"planner": planner, "seed": 1, **budget, **options})
-
-
-def hard_to_reach():
-    """The goal is behind a gap that is wide enough for the disc, but hardly for its turning radius."""
-    data = np.zeros((40, 40))
-    data[:, 20] = 100
-    data[20, 20] = 0
-    map = GridMap(data, 0.5, (-10.0, -10.0, 0.0))
-    return Problem(map, Vehicle(9.0, 0.24), (-5.0, -8.0, math.pi / 2), (5.0, -8.0, -math.pi / 2))
-
-
-def walled(value=100):
-    data = np.zeros((40, 40))
-    data[:, 19:21] = value
-    return GridMap(data, 0.5, (-10.0, -10.0, 0.0))
-
-
-def assert_refused(result, status, *words):
-    assert result.status == status
-    assert result.path is result.length is result.gap is None
-    assert result.culprit is None or (len(result.culprit) == 2 and all(type(c) is float for c in result.culprit))
-    assert result.audit == ""
-    assert len(result.tree) >= 1
-    assert "\n" not in result.message
-    for word in words:
-        assert word in result.message
 
 
 def test_solves(planner):
@@ -107,106 +69,6 @@ def test_a_point_does_not_drive_through_a_wall(planner, x, y):
     assert result.status in (Status.NONE, Status.NO_VALID_PATH)
     if result.path:
         assert not shapely.LineString(result.path.poses(0.005)[:, :2]).intersects(wall)
-
-
-def test_the_time_limit_ends_it(planner, monkeypatch):
-    now = iter(np.arange(1e6) / 100)
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
-    result = plan(hard_to_reach(), settings(planner, samples=1_000_000, planning_time=0.5))
-    assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "of 1000000 samples drawn", "allow more time")
-    assert 0 < result.samples < 1_000_000
-    assert 0.5 <= result.planning_time < 1.0
-    assert f"{len(result.tree)} tree nodes" in result.message
-
-
-def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
-    now = iter(np.arange(1e6) / 100)
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL),
-                  settings("rrt_star", goal_bias=0.5, samples=1_000_000, planning_time=0.5))
-    assert result.status == Status.NONE
-    assert result.samples < 1_000_000
-    assert not result.cancelled
-
-
-def test_what_the_time_limit_cuts_short_is_shortened_and_told(monkeypatch):
-    """By a search with the samples that it took the same path is had again."""
-    problem, told = Problem(walled_with_a_gap(), VEHICLE, START, GOAL), []
-    with monkeypatch.context() as patched:
-        now = iter(np.arange(1e6) / 100)
-        patched.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
-        result = plan(problem, settings("rrt_star", samples=1_000_000, planning_time=2.5),
-                      on_progress=lambda progress: told.append(progress.length))
-    assert result.status == Status.NONE
-    assert result.samples < 1_000_000
-    assert told[-1] == result.length
-    assert result.length < result.tree.costs[(result.tree.poses == GOAL).all(axis=1)].min()
-    again = plan(problem, settings("rrt_star", samples=result.samples))
-    assert again.path == result.path
-
-
-def test_the_time_to_the_first_path_is_without_its_shortcuts(planner, monkeypatch):
-    def slowly(path, field, need):
-        time.sleep(0.05)
-        return shortened(path, field, need)
-
-    monkeypatch.setattr("dubins_rrt_ros.planning.rrt.shortened", slowly)
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, samples=200, goal_bias=0.5))
-    assert 0 < result.time_to_first < result.planning_time - 0.05
-
-
-def test_the_sample_budget_ends_it(planner):
-    result = plan(hard_to_reach(), settings(planner, samples=200))
-    assert_refused(result, Status.NO_VALID_PATH, "200 of 200 samples", "allow more samples")
-    assert result.samples == 200
-
-
-def test_cancelled_before_the_first_path(planner):
-    asked = []
-    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 4)
-    assert_refused(result, Status.CANCELLED, "Cancelled before a first path", "samples drawn")
-    assert result.cancelled
-    assert len(asked) == 4
-    assert 0 < result.samples < settings(planner).samples
-
-
-def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.ClearanceField", None)
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: True)
-    assert_refused(result, Status.CANCELLED, "Cancelled before a first path: 0 of", "samples drawn, 1 tree node, ")
-    assert (result.samples, len(result.tree), result.map_time) == (0, 1, 0.0)
-
-
-def test_cancelled_while_the_clearance_field_was_computed(planner, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.reasons", None)
-    asked = []
-    result = plan(Problem(walled(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 2)
-    assert_refused(result, Status.CANCELLED)
-    assert result.map_time > 0
-
-
-def test_prepare_does_what_does_not_depend_on_the_request(monkeypatch):
-    from dubins_rrt_ros.planning import ClearanceField
-    from dubins_rrt_ros.planning import clearance as module
-
-    map = walled(-1)
-    prepare(map, VEHICLE, allow_unknown=True)
-    monkeypatch.setattr(module, "_grid_parts", None)
-    monkeypatch.setattr(module.ndimage, "label", None)
-    assert ClearanceField.of(map, True).components(VEHICLE.robot_radius).max() == 1
-    result = plan(Problem(map, VEHICLE, START, GOAL, allow_unknown=True), settings("rrt_star", samples=1))
-    assert result.map_time < 0.01
-
-
-def test_cancelled_after_the_first_path_gives_the_best_so_far():
-    found = []
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star"), cancel=lambda: bool(found),
-                  on_progress=lambda progress: found.append(progress.length) if progress.length else None)
-    assert result.status == Status.NONE
-    assert result.cancelled
-    assert result.length == pytest.approx(found[-1])
-    assert result.samples < settings("rrt_star").samples
-    assert "cancelled after" in result.message
 
 
 @pytest.mark.parametrize("map", [walled(), PolygonMap(shapely.box(-10, -10, 10, 10) - shapely.box(-0.5, -11, 0.5, 11))])
@@ -332,58 +194,6 @@ def test_goal_with_tolerance(planner, tolerance):
     assert f"it ends {off:.3f} m and {turned:.3f} rad from the goal" in result.message
     assert result.length >= result.lower_bound
     assert result.lower_bound == pytest.approx(math.dist(START[:2], GOAL[:2]) - problem.goal_tolerance_xy)
-
-
-def test_progress_tells_of_every_better_path():
-    told, snapshots = [], []
-
-    def on_progress(progress):
-        told.append(progress)
-        snapshots.append(progress.snapshot())
-
-    problem = Problem(walled_with_a_gap(), VEHICLE, START, GOAL)
-    result = plan(problem, settings("rrt_star"), on_progress=on_progress)
-    assert result.status == Status.NONE
-    assert " so far" not in result.message
-    better = [progress.length for progress in told if progress.improved]
-    assert len(better) >= 1
-    assert better == sorted(better, reverse=True)
-    assert len(set(better)) == len(better)
-    assert better[-1] == pytest.approx(result.length, abs=1e-5)
-    samples = [progress.samples for progress in told]
-    assert samples == sorted(samples)
-    for progress, snapshot in zip(told, snapshots, strict=True):
-        assert snapshot.samples == progress.samples
-        assert (snapshot.path is None) == (progress.length is None)
-        if snapshot.path:
-            assert snapshot.message.startswith(f"Path of {snapshot.length:.2f} m so far, at most ")
-            assert snapshot.audit == "ok"
-            assert audit(snapshot.path, problem).ok
-            assert snapshot.length == pytest.approx(progress.length)
-            assert isinstance(snapshot.tree, Tree)
-
-
-def walled_with_a_gap():
-    grid = walled()
-    data = np.array(grid.data)
-    data[30:, :] = 0
-    return GridMap(data, grid.resolution, grid.origin)
-
-
-def test_a_snapshot_without_a_path_says_that_the_search_goes_on(planner, monkeypatch):
-    now = iter(np.arange(1e6) / 10)
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
-    messages = []
-    plan(hard_to_reach(), settings(planner, samples=20, planning_time=1000.0),
-         on_progress=lambda progress: messages.append(progress.snapshot().message))
-    assert messages
-    assert all(message.startswith("No path so far: ") for message in messages)
-
-
-def test_progress_of_rrt_has_one_path():
-    told = []
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt"), on_progress=told.append)
-    assert [progress.length for progress in told if progress.improved] == [pytest.approx(result.length)]
 
 
 def test_a_fresh_seed_is_reported_and_repeats(planner):
