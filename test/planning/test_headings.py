@@ -74,9 +74,9 @@ def test_the_costs_are_those_by_steps_along_rows_and_columns_less_what_diagonals
 
 def by_dijkstra(passable, given):
     """The costs where passable cells are joined to those in front, behind and beside them."""
-    index = np.arange(passable.size).reshape(passable.shape)
-    begin = np.flatnonzero(np.isfinite(given.ravel()) & passable.ravel())
-    edges = [(np.full(len(begin), passable.size), begin, given.ravel()[begin])]
+    index = np.arange(passable.size, dtype=np.int32).reshape(passable.shape)  # SciPy 1.11 takes no longer ones
+    begin = index[np.isfinite(given) & passable]
+    edges = [(np.full_like(begin, passable.size), begin, given.ravel()[begin])]
     for axis in (0, 1):
         joined = passable & np.roll(passable, 1, axis)
         edges.append((index[joined], np.roll(index, 1, axis)[joined], np.ones(joined.sum())))
