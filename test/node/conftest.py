@@ -70,6 +70,18 @@ def map_yaml(tmp_path):
     return path
 
 
+@pytest.fixture(scope="module")
+def map_file(tmp_path_factory):
+    """The yard's map as a file."""
+    from yard import yard
+
+    from dubins_rrt_ros.planning import GridMap, save_map
+
+    file = tmp_path_factory.mktemp("maps") / "yard.yaml"
+    save_map(GridMap(yard(), 0.1), file)
+    return str(file)
+
+
 @pytest.fixture
 def planners():
     """Planner processes and their clients."""

@@ -18,9 +18,7 @@ from harness import poses_of, values_of
 from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_srvs.srv import Trigger
-from yard import ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, IN_UNKNOWN, ON_THE_WAY_OUT, QUICK, START, yard
-
-from dubins_rrt_ros.planning import GridMap, save_map
+from yard import ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, IN_UNKNOWN, ON_THE_WAY_OUT, QUICK, START
 
 LATCHED, VOLATILE = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
 #: Of each topic the direction, the name after the namespace, the type and the durability; all are reliable.
@@ -62,13 +60,6 @@ STATUSES = [
     (212, "INVALID_POSE", ERROR, START, (math.nan, 5.0, 0.0), "map", QUICK, ["finite"]),
     (212, "INVALID_POSE", ERROR, (math.inf, 5.0, 0.0), GOAL, "map", QUICK, ["finite"]),
 ]
-
-
-@pytest.fixture(scope="module")
-def map_file(tmp_path_factory):
-    file = tmp_path_factory.mktemp("maps") / "yard.yaml"
-    save_map(GridMap(yard(), 0.1), file)
-    return str(file)
 
 
 @pytest.fixture(scope="module")

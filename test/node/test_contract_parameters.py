@@ -12,9 +12,7 @@ from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 from rclpy.parameter import parameter_value_to_python
 from rosgraph_msgs.msg import Clock
-from yard import GOAL, IN_UNKNOWN, QUICK, START, yard
-
-from dubins_rrt_ros.planning import GridMap, save_map
+from yard import GOAL, IN_UNKNOWN, QUICK, START
 
 #: Of each parameter the type, the default where the contract has one, and a value that is refused.
 DOUBLE, INTEGER, BOOL, STRING = (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL,
@@ -54,13 +52,6 @@ def defaults(module_planners):
     """The client of a planner that was given no parameters."""
     module_planners.start()
     return module_planners.client()
-
-
-@pytest.fixture(scope="module")
-def map_file(tmp_path_factory):
-    file = tmp_path_factory.mktemp("maps") / "yard.yaml"
-    save_map(GridMap(yard(), 0.1), file)
-    return str(file)
 
 
 @pytest.fixture(scope="module")
