@@ -12,7 +12,9 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from ._kernels import COMPILED
 from ._kernels.clearance import GridClearance, PolygonClearance
+from ._kernels.distance import fill_columns, look_aside
 from .dubins import WORDS, DubinsCurve
 from .map import GridMap, Map, PolygonMap
 from .problem import Pose
@@ -21,6 +23,8 @@ from .problem import Pose
 MARGIN = 0.0005
 #: About how many raster cells lie over a polygon map.
 POLYGON_CELLS = 15_000
+#: So many columns at a time are searched for cells that a change reaches.
+STRIP = 64
 
 _fields: WeakKeyDictionary[Map, dict[bool, "ClearanceField"]] = WeakKeyDictionary()
 
@@ -32,19 +36,24 @@ class ClearanceField:
         kernel: the compiled field, for the planner's inner loop.
     """
 
-    def __init__(self, map: Map, allow_unknown: bool = False):
-        """Compute the field; `of` keeps one per map."""
+    def __init__(self, map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
+        """Compute the field; `of` keeps one per map, and says what `previous` is for."""
         is_grid = isinstance(map, GridMap)
-        self.kernel, self._origin = _grid_parts(map, allow_unknown) if is_grid else _polygon_parts(map)
+        self.kernel, self._origin = _grid_parts(map, allow_unknown, previous) if is_grid else _polygon_parts(map)
         self._polygons = None if is_grid else map.free
         self._components: tuple[float, np.ndarray] | None = None
 
     @classmethod
-    def of(cls, map: Map, allow_unknown: bool = False) -> "ClearanceField":
-        """The field of a map, computed at the first call for as long as the map lives."""
+    def of(cls, map: Map, allow_unknown: bool = False, previous: Map | None = None) -> "ClearanceField":
+        """The field of a map, computed at the first call for as long as the map lives.
+
+        Where a `previous` grid of the same shape and resolution has a field, only what depends on the cells that differ is
+        computed; the field is the same as without it, and that of the previous grid stays as it is.
+        """
         fields = _fields.setdefault(map, {})
         if allow_unknown not in fields:
-            fields[allow_unknown] = cls(map, allow_unknown)
+            known = {} if previous is None else _fields.get(previous, {})
+            fields[allow_unknown] = cls(map, allow_unknown, known.get(allow_unknown))
         return fields[allow_unknown]
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -73,6 +82,12 @@ class ClearanceField:
         column = ((c * d[..., 0] + s * d[..., 1]) / self.kernel.resolution).astype(int)
         return np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)
 
+    def in_map_frame(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) points of the map's frame [m] at points of the raster's, whose origin is the corner of its first cell."""
+        x, y, yaw = self._origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        return np.stack([x + c * points[..., 0] - s * points[..., 1], y + s * points[..., 0] + c * points[..., 1]], axis=-1)
+
     def may_be_free(self, points: np.ndarray, need: float) -> np.ndarray:
         """(n,) bool: whether the cells that hold (n, 2) points of the map are among the `possibly_free` ones."""
         return self._may_be_free(np.asarray(self.kernel.field)[self.cells(points)], need)
@@ -93,7 +108,7 @@ class ClearanceField:
 
     def _may_be_free(self, bounds: np.ndarray, need: float) -> np.ndarray:
         # The bound of a cell is at most two of its diagonals below the clearance of any point in it.
-        return (bounds >= 0) & (bounds + np.float32(2 * math.sqrt(2) * self.kernel.resolution + 1e-6) >= need)
+        return bounds >= max(0.0, need - 2 * math.sqrt(2) * self.kernel.resolution - 1e-6)
 
 
 def _rounded_down(values: np.ndarray) -> np.ndarray:
@@ -101,33 +116,80 @@ def _rounded_down(values: np.ndarray) -> np.ndarray:
     return np.maximum(np.nextafter(values.astype(np.float32), np.float32(-np.inf)), 0)
 
 
-def _grid_parts(grid: GridMap, allow_unknown: bool) -> tuple[GridClearance | PolygonClearance, Pose]:
-    blocked = grid.blocked(allow_unknown)
-    if blocked.any():
-        between_centres = ndimage.distance_transform_edt(~blocked) * grid.resolution
+def _grid_parts(grid: GridMap, allow_unknown: bool,
+                previous: "ClearanceField | None") -> tuple[GridClearance | PolygonClearance, Pose]:
+    free, cell = ~grid.blocked(allow_unknown), grid.resolution
+    if not COMPILED:
+        aside, field = _by_scipy(free, cell)
+    elif previous is not None and (previous.kernel.field.shape, previous.kernel.resolution) == (free.shape, cell):
+        aside, field = _changed(previous.kernel, free)
     else:
-        between_centres = np.full(blocked.shape, math.inf)
-    between_centres = np.minimum(between_centres, _to_outer_centres(blocked.shape) * grid.resolution)
+        aside, field = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
+        _fill(aside, field, free, cell, *(slice(0, n) for n in free.shape))
+    return GridClearance(field, cell, grid.origin, MARGIN, aside), grid.origin
+
+
+def _fill(aside: np.ndarray, field: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
+    """Compute `aside` in some rows, and with it the field in some columns."""
+    look_aside(free[rows].view(np.uint8), aside[rows])
+    farthest = min(int(aside[:, columns].max()) >> 2, (min(free.shape) + 1) // 2)
+    fill_columns(aside, columns.start, columns.stop, _bounds(farthest, cell), field)
+
+
+def _bounds(farthest: int, cell: float) -> np.ndarray:
+    """float32: what the field holds for each squared distance in cells between centres, up to `farthest` cells."""
+    between_centres = np.sqrt(np.arange(farthest**2 + 1)) * cell
     # From centre to centre, less half a diagonal for the square and half for the point anywhere in its cell.
-    field = _rounded_down(between_centres - math.sqrt(2) * grid.resolution)
-    field[blocked] = -1
-    kernel = GridClearance(field, grid.resolution, grid.origin, MARGIN, *_cells_to_blocked(blocked))
-    return kernel, grid.origin
+    bounds = _rounded_down(between_centres - math.sqrt(2) * cell)
+    bounds[0] = -1
+    return bounds
 
 
-def _to_outer_centres(shape: tuple[int, int]) -> np.ndarray:
-    """(rows, columns): how many cells the nearest cell outside the grid is away."""
-    rows, columns = (np.minimum(np.arange(1, n + 1), np.arange(n, 0, -1)) for n in shape)
-    return np.minimum(rows[:, None], columns[None, :])
+def _changed(kernel: GridClearance, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`aside` and the field where other cells are free, computed afresh only where these matter."""
+    aside, field = np.asarray(kernel.aside), np.asarray(kernel.field)
+    changes = free != (aside != 0)
+    if not changes.any():
+        return aside, field  # which nothing writes to
+    rows, columns = (slice(n[0], n[-1] + 1) for n in (np.flatnonzero(changes.any(axis=axis)) for axis in (1, 0)))
+    reached = _reached(field, kernel.resolution, rows, columns)
+    aside, field = aside.copy(), field.copy()
+    _fill(aside, field, free, kernel.resolution, rows, reached)
+    return aside, field
 
 
-def _cells_to_blocked(blocked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How many cells to the left and to the right of each cell the next blocked one in its row is, as int32."""
-    columns = blocked.shape[1]
+def _reached(field: np.ndarray, cell: float, rows: slice, columns: slice) -> slice:
+    """Columns with all cells that may lie as far from their nearest obstacle as from a box of cells.
+
+    The distance of no other cell changes with the box. The straight way from such a cell to the box holds only points like it,
+    since neither distance falls by more than the way is long. In each column that it crosses there is a cell at most half a cell
+    off it, for which they compare the same to within a cell. So beyond columns without such cells there are none.
+    """
+    beyond_rows, beyond_columns = (np.maximum(np.maximum(box.start - n, n - box.stop + 1), 0)
+                                   for box, n in zip((rows, columns), map(np.arange, field.shape), strict=True))
+
+    def is_reached(strip: slice) -> bool:
+        # A cell for what is said above, sqrt(2) for what the field is lower by, and the rest for rounding.
+        at_most = np.maximum(field[:, strip], 0) / cell + 2.5
+        return bool((at_most**2 >= beyond_rows[:, None]**2 + beyond_columns[strip]**2).any())
+
+    first, last = columns.start, columns.stop
+    while first > 0 and is_reached(slice(max(0, first - STRIP), first)):
+        first = max(0, first - STRIP)
+    while last < field.shape[1] and is_reached(slice(last, last + STRIP)):
+        last = min(field.shape[1], last + STRIP)
+    return slice(first, last)
+
+
+def _by_scipy(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """`aside` and the field, for where the kernels are interpreted: they would take minutes for a large map."""
+    columns = free.shape[1]
     index = np.arange(columns, dtype=np.int32)
-    left = np.maximum.accumulate(np.where(blocked, index, np.int32(-columns)), axis=1)
-    right = np.minimum.accumulate(np.where(blocked, index, np.int32(2 * columns))[:, ::-1], axis=1)[:, ::-1]
-    return index - left, np.ascontiguousarray(right - index)
+    left = index - np.maximum.accumulate(np.where(free, np.int32(-1), index), axis=1)
+    right = np.minimum.accumulate(np.where(free, np.int32(columns), index)[:, ::-1], axis=1)[:, ::-1] - index
+    aside = 4 * np.minimum(left, right) + (left > right) + 2 * (right > left)
+    squared = np.rint(ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]**2).astype(int)
+    return np.ascontiguousarray(aside, np.int32), _bounds(math.isqrt(squared.max()) + 1, cell)[squared]
 
 
 def _polygon_parts(polygons: PolygonMap) -> tuple[GridClearance | PolygonClearance, Pose]:

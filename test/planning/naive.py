@@ -144,17 +144,6 @@ def costs(parents, lengths):
     return out
 
 
-def shortest_chain(count, length_between):
-    """(count,): the least length of a chain of steps from 0 to each of `count` stations, each step forwards.
-
-    `length_between` gives that of the step from one station to a later one; infinity where there is none.
-    """
-    out = np.zeros(count)
-    for end in range(1, count):
-        out[end] = min(out[begin] + length_between(begin, end) for begin in range(end))
-    return out
-
-
 def widest(clearance, start, targets):
     """The largest clearance with which neighbours in a (rows, columns) array lead from `start` to one of `targets`; else 0."""
     for level in np.unique(clearance[clearance > 0])[::-1]:
@@ -189,21 +178,17 @@ def are_connected(problem, radius):
     return any(part.distance(goal) <= problem.goal_tolerance_xy + 1e-9 for part in reached)
 
 
-def eikonal(passable, given):
-    """The costs of cells one apart where |grad cost| = 1 by first-order upwind differences; all fall at once, until none does.
+def squared_distances(blocked):
+    """(rows, columns) int: from each cell's centre to the nearest of a blocked cell, also just outside, squared and in cells."""
+    around = np.argwhere(np.pad(blocked, 1, constant_values=True)) - 1
+    rows, columns = np.indices(blocked.shape)
+    return ((rows[..., None] - around[:, 0]) ** 2 + (columns[..., None] - around[:, 1]) ** 2).min(axis=-1)
 
-    Args:
-        passable: (rows, columns) bool, False all around the edge.
-        given: (rows, columns), the costs with which passable cells begin.
-    """
-    cost = np.where(passable, given, math.inf)
-    while True:
-        along, across = (np.minimum(np.roll(cost, 1, axis), np.roll(cost, -1, axis)) for axis in (1, 0))
-        low, high = np.minimum(along, across), np.maximum(along, across)
-        apart = np.ones(cost.shape)
-        np.subtract(high, low, out=apart, where=high < low + 1)
-        fallen = low + (apart + np.sqrt(2 - apart**2)) / 2
-        falls = passable & (fallen < cost - 1e-12)
-        if not falls.any():
-            return cost
-        cost[falls] = fallen[falls]
+
+def next_in_row(blocked):
+    """(rows, columns, 2) int: how many cells the next blocked ones to the left and to the right are away; 0 is itself."""
+    out = np.zeros((*blocked.shape, 2), int)
+    for row, column in np.ndindex(blocked.shape):
+        beside = [-1, *np.flatnonzero(blocked[row]), blocked.shape[1]]
+        out[row, column] = [min(column - c for c in beside if c <= column), min(c - column for c in beside if c >= column)]
+    return out

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 import shapely
 from cases import boxes_grid, holed_polygons, maze_grid, naive_clearance, random_map, random_pose, scaled
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
 
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap
 from dubins_rrt_ros.planning.dubins import shortest
@@ -242,3 +245,61 @@ def test_walk_of_long_random_curves_in_a_turned_map():
                             tuple(rng.uniform(0, 3, 3)))
         tested += check_curve(field, clearance, curve)
     assert tested > 3
+
+
+def random_grid(rng, shape, share, resolution=0.05):
+    return GridMap(np.where(rng.random(shape) < share, 100, 0), resolution)
+
+
+def assert_same(found, expected):
+    """Bit for bit the same field, and the same exact distances."""
+    np.testing.assert_array_equal(np.asarray(found.kernel.field), np.asarray(expected.kernel.field))
+    np.testing.assert_array_equal(np.asarray(found.kernel.aside), np.asarray(expected.kernel.aside))
+
+
+@pytest.mark.parametrize("share", [0, 0.001, 0.1, 0.9, 1])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 200), (200, 1), (100, 150), (600, 500)])
+def test_the_raster_is_the_distance_between_centres_less_a_diagonal(shape, share):
+    """Rounded down to float32; from scipy's transform, with a ring of obstacles around."""
+    grid = random_grid(np.random.default_rng(9), shape, share, 0.03337)
+    between = ndimage.distance_transform_edt(np.pad(grid.data == 0, 1))[1:-1, 1:-1] * grid.resolution
+    lower = np.nextafter((between - math.sqrt(2) * grid.resolution).astype(np.float32), np.float32(-math.inf)).clip(min=0)
+    np.testing.assert_array_equal(np.asarray(ClearanceField(grid).kernel.field), np.where(grid.data == 100, -1, lower))
+
+
+@settings(max_examples=scaled(300, least=20))
+@given(st.integers(0, 2**31), st.sampled_from([0, 0.0005, 0.01, 0.2, 0.9]), st.sampled_from([0, 0.1, 1]))
+def test_a_changed_map_has_the_field_of_a_new_one(seed, share, new_share):
+    rng = np.random.default_rng(seed)
+    old = random_grid(rng, rng.integers(1, (60, 250)), share)
+    before = ClearanceField.of(old)
+    kept = np.array(before.kernel.field), np.array(before.kernel.aside)
+    data = old.data.copy()
+    row, column = rng.integers(0, data.shape)
+    box = data[row:row + rng.integers(1, 12), column:column + rng.integers(1, 30)]
+    box[...] = np.where(rng.random(box.shape) < new_share, 100, 0)
+    changed = GridMap(data, old.resolution, (1.0, 2.0, 0.3))
+    found = ClearanceField.of(changed, previous=old)
+    assert_same(found, ClearanceField(changed))
+    points = random_points(rng, changed, 20)
+    np.testing.assert_array_equal(found.at(points), ClearanceField(changed).at(points))
+    np.testing.assert_array_equal(np.asarray(before.kernel.field), kept[0])
+    np.testing.assert_array_equal(np.asarray(before.kernel.aside), kept[1])
+
+
+@pytest.mark.parametrize("previous", [
+    GridMap(np.zeros((9, 8)), 0.5), GridMap(np.zeros((8, 9)), 0.25), PolygonMap(shapely.box(0, 0, 4, 4)), None,
+], ids=["shape", "resolution", "polygons", "none"])
+def test_a_map_of_another_kind_is_no_help_and_no_harm(previous):
+    if previous is not None:
+        ClearanceField.of(previous)
+    grid = random_grid(np.random.default_rng(10), (8, 9), 0.2, 0.5)
+    assert_same(ClearanceField.of(grid, previous=previous), ClearanceField(grid))
+
+
+def test_a_previous_map_without_a_field_is_no_help_and_no_harm():
+    grid = GridMap([[0, -1, 0, 0]], 0.5)
+    previous = GridMap([[0, 0, 0, -1]], 0.5)
+    ClearanceField.of(previous)  # but not with unknown space allowed
+    assert_same(ClearanceField.of(grid, True, previous), ClearanceField(grid, True))
+    assert_same(ClearanceField.of(grid, False, previous), ClearanceField(grid, False))

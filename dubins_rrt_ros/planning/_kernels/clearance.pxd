@@ -13,8 +13,7 @@ cdef class Clearance:
                             double first, double second, double third, double need) noexcept nogil
 
 cdef class GridClearance(Clearance):
-    cdef int[:, ::1] to_left
-    cdef int[:, ::1] to_right
+    cdef readonly int[:, ::1] aside
     cdef double squared_across(self, double x, int row, int column) noexcept nogil
 
 cdef class PolygonClearance(Clearance):

@@ -122,13 +122,12 @@ class Clearance:
 class GridClearance(Clearance):
     """Clearance from the squares of occupied cells.
 
-    `to_left` and `to_right` hold for each cell how many cells away the next occupied one in its row is: 0 is itself.
+    `aside` holds for each cell how far away the next occupied ones in its row are, as `distance.look_aside` writes it.
     """
 
-    def __init__(self, field, resolution, origin, margin, to_left, to_right):
+    def __init__(self, field, resolution, origin, margin, aside):
         Clearance.__init__(self, field, resolution, origin, margin)
-        self.to_left = to_left
-        self.to_right = to_right
+        self.aside = aside
 
     @cython.cfunc
     @cython.nogil
@@ -136,10 +135,12 @@ class GridClearance(Clearance):
     @cython.exceptval(check=False)
     def squared_across(self, x: cython.double, row: cython.int, column: cython.int) -> cython.double:
         """The squared distance along x to the nearest occupied square of a row."""
-        left: cython.int = self.to_left[row, column]
-        right: cython.int = self.to_right[row, column]
-        if left == 0 or right == 0:
+        aside: cython.int = self.aside[row, column]
+        if aside == 0:
             return 0
+        # The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
+        left: cython.int = (aside >> 2) + (aside & 1)
+        right: cython.int = (aside >> 2) + (aside >> 1 & 1)
         gap: cython.double = min(x - (column - left + 1) * self.resolution, (column + right) * self.resolution - x)
         return gap * gap
 
