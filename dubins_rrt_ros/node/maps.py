@@ -41,6 +41,8 @@ class Preparation:
 
     Attributes:
         map, robot_radius, allow_unknown: what it is for.
+        previous: a map that was prepared before, from which what did not change is taken over; None once it is computed, so
+            that it is not kept alive any longer.
         done: set when it is computed.
         is_wanted: whether a request waits for it, which it does not any more once there is a newer map.
     """
@@ -48,6 +50,7 @@ class Preparation:
     map: Map
     robot_radius: float
     allow_unknown: bool
+    previous: Map | None
     done: threading.Event
     is_wanted: bool = False
 
@@ -112,7 +115,7 @@ class Maps:
         wanted = self.current.map, now.vehicle.robot_radius, now.problem["allow_unknown"]
         last = self._preparation
         if last is None or (last.map, last.robot_radius, last.allow_unknown) != wanted:
-            self._preparation = Preparation(*wanted, threading.Event())
+            self._preparation = Preparation(*wanted, _prepared_before(last), threading.Event())
             self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
         return self._preparation
 
@@ -160,8 +163,9 @@ class Maps:
         try:
             if preparation.is_wanted or preparation.map is self.current.map:
                 preparation.map.id  # noqa: B018 - of a large map it takes long, and is kept
-                prepare(preparation.map, vehicle, preparation.allow_unknown)
+                prepare(preparation.map, vehicle, preparation.allow_unknown, preparation.previous)
         finally:
+            preparation.previous = None
             preparation.done.set()  # also where it failed, which plan() then says of the request
         return preparation
 
@@ -199,6 +203,13 @@ class Maps:
 
     def _message(self, grid: GridMap) -> OccupancyGrid:
         return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
+
+
+def _prepared_before(last: Preparation | None) -> Map | None:
+    """The newest map that is prepared, as far as the last preparation knows."""
+    if last is None:
+        return None
+    return last.map if last.done.is_set() else last.previous
 
 
 def _within(timeout: float, results: queue.SimpleQueue) -> Any:

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import shapely
 
-from .map import GridMap, Map, prepare_for_threads
+from .map import GridMap, Map
 from .path import Path
 from .problem import Problem
 
@@ -28,8 +28,12 @@ PRECISION, SHARE = 1e-3, 0.02
 MOST_PIECES = 500_000
 #: About how many pieces a path is cut into at first.
 FIRST_PIECES = 64
-
-_judges: WeakKeyDictionary[Map, dict[bool, "_Obstacles"]] = WeakKeyDictionary()
+#: Obstacles in a grid are looked for within so many cells of a point at first.
+FIRST_REACH = 8
+#: Cells are read, and kept, in square tiles with a margin around: the margin at least, the side of a tile in margins.
+MARGIN, TILE = 64, 8
+#: About how many rows of cells are searched at once, for the sake of memory.
+ROWS_AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -156,59 +160,112 @@ def _apart(a, b) -> tuple[float, float]:
     return math.hypot(a[0] - b[0], a[1] - b[1]), abs(math.remainder(a[2] - b[2], math.tau))
 
 
-class _Obstacles:
-    """The true shapes of a map's obstacles."""
+class _PolygonObstacles:
+    """What is outside of polygons."""
 
-    def __init__(self, inside: shapely.Geometry, solids: np.ndarray):
-        self._inside = inside
-        prepare_for_threads(inside)
-        lines = shapely.get_parts(shapely.get_rings(shapely.get_parts(inside)))
-        corners = [shapely.get_coordinates(line) for line in lines]
-        edges = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in corners])
-        self._tree = shapely.STRtree(np.concatenate([shapely.linestrings(edges), solids]))
+    def __init__(self, free: shapely.Geometry):
+        self._free = free
+        corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(free)), return_index=True)
+        edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
+        self._tree = shapely.STRtree(shapely.linestrings(edges))
 
     def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Of points from the obstacles; 0 in one."""
         _, distance = self._tree.query_nearest(shapely.points(x, y), return_distance=True, all_matches=False)
-        return np.where(shapely.contains_xy(self._inside, x, y), distance, 0.0)
+        return np.where(shapely.contains_xy(self._free, x, y), distance, 0.0)
 
 
-def prepare_audit(map: Map, allow_unknown: bool) -> None:
-    """Compute what depends on the map alone, so that no audit need wait for it: it is kept as long as the map."""
-    _obstacles_of(map, allow_unknown)
+class _GridObstacles:
+    """The squares of a grid's blocked cells, and what is outside the grid. Only cells near the points asked for are read."""
+
+    def __init__(self, grid: GridMap, allow_unknown: bool):
+        # Not the grid itself: it would be kept alive by what is kept for as long as it lives.
+        self._data, self._resolution, self._origin = grid.data, grid.resolution, grid.origin
+        self._allow_unknown = allow_unknown
+        self._windows: dict[tuple[int, complex], _Window] = {}
+
+    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Of points from the obstacles; 0 in one."""
+        x0, y0, yaw = self._origin
+        rows, columns = self._data.shape
+        place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
+        to_edge = np.minimum.reduce([place.real, columns - place.real, place.imag, rows - place.imag])
+        out = np.where(to_edge > 0, to_edge, 0.0)
+        reach, undecided = FIRST_REACH, np.flatnonzero(out)
+        while len(undecided):
+            out[undecided] = np.minimum(out[undecided], self._within(reach, place[undecided]))
+            undecided = undecided[out[undecided] >= reach]
+            reach *= 4
+        return out * self._resolution
+
+    def _within(self, reach: int, place: np.ndarray) -> np.ndarray:
+        """How far points in the grid are from blocked cells, in cells; infinity where none is nearer than `reach`."""
+        margin = max(MARGIN, reach)
+        side = TILE * margin
+        tiles = place.real // side + 1j * (place.imag // side)
+        out = np.empty(len(place))
+        at_once = max(1, ROWS_AT_ONCE // reach)
+        for tile in set(tiles.tolist()):
+            if (margin, tile) not in self._windows:
+                self._windows[margin, tile] = self._window(side * tile, side, margin)
+            here = np.flatnonzero(tiles == tile)
+            for first in range(0, len(here), at_once):
+                some = here[first:first + at_once]
+                out[some] = self._windows[margin, tile].distance(place[some], reach)
+        return np.where(out < reach, out, math.inf)
+
+    def _window(self, corner: complex, side: int, margin: int) -> "_Window":
+        """The cells of a square tile and those within the margin around it."""
+        left, low = max(0, int(corner.real) - margin), max(0, int(corner.imag) - margin)
+        part = self._data[low:int(corner.imag) + side + margin, left:int(corner.real) + side + margin]
+        return _Window(GridMap(part, self._resolution).blocked(self._allow_unknown), left, low)
+
+
+class _Window:
+    """The blocked cells of a part of a grid.
+
+    Args:
+        blocked: (rows, columns) bool.
+        left, low: the column and the row of the grid where the part begins.
+    """
+
+    def __init__(self, blocked: np.ndarray, left: int, low: int):
+        self._rows = np.flatnonzero(blocked.any(axis=1))
+        # With blocked columns on both sides every cell has a blocked one before and after it in its row.
+        blocked = np.pad(blocked[self._rows], ((0, 0), (1, 1)), constant_values=True)
+        self._width = blocked.shape[1]
+        self._cells = np.flatnonzero(blocked)
+        self._left, self._low = left - 1, low
+
+    def distance(self, place: np.ndarray, reach: int) -> np.ndarray:
+        """Of points from the blocked cells, in cells, where it is below `reach`; elsewhere it is `reach` or more.
+
+        In each of the rows so near to a point that hold such cells, the next to the left and to the right are looked up.
+        """
+        if not len(self._rows):
+            return np.full(len(place), math.inf)
+        x, y = (place.real - self._left)[:, None], (place.imag - self._low)[:, None]
+        to_either_side = min(reach, len(self._rows))
+        row = np.searchsorted(self._rows, y.astype(int)) + np.arange(-to_either_side, to_either_side + 1)
+        row = np.minimum(np.maximum(row, 0), len(self._rows) - 1)
+        begin = row * self._width
+        following = np.searchsorted(self._cells, begin + x.astype(int))
+        beside = np.minimum(self._cells[following] - begin - x, x - (self._cells[following - 1] - begin) - 1)
+        above = np.maximum(self._rows[row] - y, y - self._rows[row] - 1)
+        return np.sqrt((np.maximum(beside, 0)**2 + np.maximum(above, 0)**2).min(axis=1))
+
+
+_Obstacles = _GridObstacles | _PolygonObstacles
+_obstacles: WeakKeyDictionary[Map, dict[bool, _Obstacles]] = WeakKeyDictionary()
 
 
 def _obstacles_of(map: Map, allow_unknown: bool) -> _Obstacles:
-    by_unknown = _judges.setdefault(map, {})
+    """Kept as long as the map, for the next path on it."""
+    by_unknown = _obstacles.setdefault(map, {})
     if allow_unknown not in by_unknown:
-        by_unknown[allow_unknown] = (_grid_obstacles(map, allow_unknown) if isinstance(map, GridMap)
-                                     else _Obstacles(map.free, np.array([])))
+        by_unknown[allow_unknown] = (_GridObstacles(map, allow_unknown) if isinstance(map, GridMap)
+                                     else _PolygonObstacles(map.free))
     return by_unknown[allow_unknown]
-
-
-def _grid_obstacles(grid: GridMap, allow_unknown: bool) -> _Obstacles:
-    """The squares of occupied cells, joined to rectangles, and what is outside the grid."""
-    blocked = np.pad(grid.blocked(allow_unknown).astype(np.int8), ((0, 0), (1, 1)))
-    change = np.diff(blocked, axis=1)
-    row, left = np.nonzero(change == 1)
-    right = np.nonzero(change == -1)[1]
-    # Cells side by side in a row are one run; runs of equal extent one above the other are one rectangle.
-    order = np.lexsort((row, right, left))
-    row, left, right = row[order], left[order], right[order]
-    goes_on = (np.diff(left) == 0) & (np.diff(right) == 0) & (np.diff(row) == 1)
-    first, last = np.append(True, ~goes_on), np.append(~goes_on, True)
-    solids = _rectangles(grid, left[first], row[first], right[first], row[last] + 1) if len(row) else np.array([])
-    return _Obstacles(_rectangles(grid, 0, 0, *grid.data.shape[::-1]), solids)
-
-
-def _rectangles(grid: GridMap, left, low, right, high) -> np.ndarray:
-    """Rectangles given in cells as polygons in the map's frame."""
-    x0, y0, yaw = grid.origin
-    corners = np.stack([np.stack([left, low], -1), np.stack([right, low], -1), np.stack([right, high], -1),
-                        np.stack([left, high], -1)], axis=-2) * grid.resolution
-    turned = corners[..., 0] + 1j * corners[..., 1]
-    turned = turned * np.exp(1j * yaw) + complex(x0, y0)
-    return shapely.polygons(np.stack([turned.real, turned.imag], axis=-1))
 
 
 def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[float, tuple[float, float], bool]:
@@ -220,7 +277,7 @@ def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[f
     size = (arcs.length / pieces)[index]
     begin = nth * size
 
-    def clearance(s):
+    def clearance(index, s):
         nonlocal least, where
         x, y, _ = arcs.at(index, s)
         found = obstacles.distance(x, y)
@@ -230,13 +287,16 @@ def _least_clearance(arcs: _Arcs, obstacles: _Obstacles, need: float) -> tuple[f
         return found
 
     least, where = math.inf, (math.nan, math.nan)
-    at_begin, at_end = clearance(begin), clearance(begin + size)
+    # A piece ends where the next begins, but for the last of an arc.
+    at_begin, at_ends = np.split(clearance(np.append(index, np.arange(len(pieces))), np.append(begin, arcs.length)), [len(index)])
+    at_end = np.roll(at_begin, -1)
+    at_end[np.cumsum(pieces) - 1] = at_ends
     while 0 < len(index) <= MOST_PIECES and least >= need - CONTACT:
         bound = (at_begin + at_end - size) / 2
         open_ = (bound < need - 2 * CONTACT) | (bound < least - max(PRECISION, SHARE * least))
         index, begin, size, at_begin, at_end = (a[open_] for a in (index, begin, size / 2, at_begin, at_end))
         if len(index):
-            at_middle = clearance(begin + size)
+            at_middle = clearance(index, begin + size)
             begin = np.concatenate([begin, begin + size])
             at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
             index, size = np.tile(index, 2), np.tile(size, 2)

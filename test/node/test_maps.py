@@ -11,7 +11,7 @@ from nav_msgs.srv import GetMap, LoadMap
 from std_srvs.srv import Trigger
 from yard import ENDLESS, GOAL, QUICK, START
 
-from dubins_rrt_ros.planning import GridMap
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan
 
 
 def walled(*rows_and_columns):
@@ -107,6 +107,19 @@ def test_a_request_keeps_the_map_that_it_began_with_and_the_next_has_the_new_one
     told = client.status_of(plan_id + 1, samples=str(QUICK["samples"]))
     assert (told["error_name"], told["map_id"]) == ("NONE", id_of(DETOUR))
     wait_for_path_around(client, DETOUR)
+
+
+def test_on_a_map_that_changed_paths_are_the_same_as_on_one_that_is_new(plain):
+    process, client = plain
+    client.set_parameters(**QUICK)
+    for cells in (FREE, DETOUR, DETOUR | HARMLESS, HARMLESS, CLOSED, DETOUR, FREE):
+        publish(client, process, cells)
+        path, told = client.plan(START, GOAL)
+        expected = plan(Problem(GridMap(cells, 0.1), Vehicle(), START, GOAL), Settings(**QUICK))
+        assert (told["error_name"], told["map_id"]) == (expected.status.name, id_of(cells))
+        if expected.path:
+            wanted = expected.path.poses(expected.settings.path_spacing)
+            assert poses_of(path)[:, :2] == pytest.approx(wanted[:, :2], abs=1e-9)
 
 
 def test_a_path_that_a_new_map_blocks_is_withdrawn_and_planned_again(replanning):

@@ -1,7 +1,9 @@
 """The audit finds every kind of wrong path, and nothing in a right one."""
 
 import ast
+import gc
 import math
+import weakref
 from dataclasses import replace
 from pathlib import Path as File
 
@@ -206,6 +208,76 @@ def test_least_clearance_is_that_of_the_naive_twin():
         assert result.min_clearance == pytest.approx(least, abs=0.002)
         found += 1
     assert found > 3
+
+
+def sparse_grid(rng, side, blocked):
+    """A turned grid of some thousand cells' width with a few blocked ones, so that obstacles are near and far."""
+    data = np.zeros((side, side + side // 10), np.int8)
+    data[rng.integers(0, side, blocked), rng.integers(0, side, blocked)] = rng.choice([100, -1], blocked)
+    return GridMap(data, 0.05, (*rng.uniform(-50, 50, 2), rng.uniform(-math.pi, math.pi)))
+
+
+def random_points(rng, map, count):
+    """Points of a map's rectangle and around it."""
+    corners = map.corners()
+    return corners[0] + rng.uniform(-0.05, 1.05, (count, 2)) @ (corners[[1, 3]] - corners[0])
+
+
+@pytest.mark.parametrize("allow_unknown", [False, True])
+@pytest.mark.parametrize("side, blocked", [(700, 0), (700, 1), (1500, 1), (1500, 12), (2500, 3)])
+def test_the_clearance_of_a_point_is_exact_however_far_the_obstacles(side, blocked, allow_unknown):
+    rng = np.random.default_rng(side + blocked)
+    map = sparse_grid(rng, side, blocked)
+    points = random_points(rng, map, 40)
+    poses = [(*point, 0.0) for point in points.tolist()]
+    problem = Problem(map, Vehicle(), START, GOAL, allow_unknown=allow_unknown)
+    found = [audit_function(Path(pose, pose, ()), problem).min_clearance for pose in poses]
+    assert found == pytest.approx(naive_clearance(map, allow_unknown)(points), abs=1e-9)
+
+
+def test_the_verdict_on_random_paths_is_that_of_the_naive_twin():
+    """Also on those that run through obstacles and out of the map."""
+    rng = np.random.default_rng(6)
+    verdicts = []
+    for map in [*random_maps(30), *(sparse_grid(rng, 700, 20) for _ in range(3))]:
+        clearance = naive_clearance(map)
+        for points in random_points(rng, map, 6).reshape(3, 2, 2):
+            start, goal = ((*point, rng.uniform(-math.pi, math.pi)) for point in points.tolist())
+            curve = shortest(start, goal, 0.5)
+            least = clearance(points_along(start, curve.word, curve.lengths, 0.5, 0.002)).min()
+            radius = float(max(0.01, least + rng.uniform(-0.1, 0.1)))
+            verdict = audit_function(Path(start, goal, (curve,)), Problem(map, Vehicle(0.5, radius), start, goal))
+            if abs(radius - least) > 0.002:
+                assert verdict.ok == (radius < least)
+                verdicts.append(verdict.ok)
+            if verdict.ok:  # otherwise the search for the least ends with the first contact
+                assert verdict.min_clearance == pytest.approx(least, rel=0.021, abs=0.002)
+    assert 10 < sum(verdicts) < len(verdicts) - 10
+
+
+def test_of_a_large_noisy_map_every_part_of_a_path_counts():
+    """A lane from edge to edge, with one blocked cell in it, or none."""
+    noise = np.where(np.random.default_rng(3).random((60, 5000)) < 0.2, 100, 0).astype(np.int8)
+    noise[20:40] = 0
+    start, goal = (1.0, 1.5, 0.0), (249.0, 1.5, 0.0)
+    path = Path(start, goal, (shortest(start, goal, 1.0),))
+    for column in (None, *range(100, 4900, 480)):
+        data = noise.copy()
+        if column is not None:
+            data[32, column] = 100
+        verdict = audit_function(path, Problem(GridMap(data, 0.05), Vehicle(1.0, 0.3), start, goal))
+        assert verdict.ok == (column is None)
+        assert verdict.min_clearance == pytest.approx(0.5, rel=0.02) or verdict.min_clearance < 0.3
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_a_map_is_not_kept_alive(kind):
+    map = square(kind)
+    assert audit_function(Path(START, START, ()), Problem(map, Vehicle(1.0, 0.3), START, START)).ok
+    kept = weakref.ref(map)
+    del map
+    gc.collect()
+    assert kept() is None
 
 
 def test_the_audit_shares_no_code_with_the_planner():

@@ -1,0 +1,118 @@
+"""Maps that come one after the other: what each is prepared from, and that the old ones are let go. The node is a real one."""
+
+import gc
+import threading
+import time
+import weakref
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+from dubins_rrt_ros.node import maps as module
+from dubins_rrt_ros.node.mailbox import Mailbox
+from dubins_rrt_ros.node.maps import Maps
+from dubins_rrt_ros.node.parameters import Parameters
+from dubins_rrt_ros.planning import GridMap
+
+SOON = 10.0
+
+
+class Keeper:
+    """Keeps maps as the planner's node does.
+
+    Attributes:
+        made: the names of the maps that were prepared, each with that of the map that it was prepared from.
+    """
+
+    def __init__(self, executor, node):
+        self._executor = executor
+        self._maps = Maps(node, Parameters(node), Mailbox(node), lambda: None, lambda: self._heard.append(self._name))
+        self._name, self._heard = "", []
+        self.worker = self._maps.worker
+        self.made = []
+
+    def prepare(self, map, vehicle, allow_unknown, previous):
+        self.made.append((map.name, previous and previous.name))
+
+    def take(self, name):
+        """Take a map; a weak reference to it."""
+        grid = GridMap(np.zeros((10, 10)), 0.1, name=name)
+        self._name = name
+        self._maps._take(grid, grid)
+        return weakref.ref(grid)
+
+    def wait(self):
+        """Until the newest is prepared and that has been heard of."""
+        end = time.monotonic() + SOON
+        while self._name not in self._heard:
+            assert time.monotonic() < end, f"map {self._name} is not prepared"
+            self._executor.spin_once(timeout_sec=0.1)
+
+    @contextmanager
+    def busy(self):
+        """What is taken within is prepared after it."""
+        go_on = threading.Event()
+        self.worker.submit(lambda cancelled: go_on.wait(SOON), lambda outcome: None)
+        yield
+        go_on.set()
+
+
+@pytest.fixture
+def keeper(monkeypatch):
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("planner", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    keeper = Keeper(executor, node)
+    monkeypatch.setattr(module, "prepare", keeper.prepare)
+    yield keeper
+    assert keeper.worker.close(SOON)
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def test_a_map_is_prepared_from_the_one_before(keeper):
+    for name in "abc":
+        keeper.take(name)
+        keeper.wait()
+    assert keeper.made == [("a", None), ("b", "a"), ("c", "b")]
+
+
+def test_a_map_is_prepared_from_the_last_that_was_where_those_between_were_not(keeper):
+    keeper.take("a")
+    keeper.wait()
+    with keeper.busy():
+        for name in "bcd":
+            keeper.take(name)
+    keeper.wait()
+    assert keeper.made == [("a", None), ("d", "a")]
+
+
+def test_old_maps_are_let_go(keeper):
+    taken = []
+    for name in "abcd":
+        taken.append(keeper.take(name))
+        keeper.wait()
+    gc.collect()
+    assert [kept() is not None for kept in taken] == [False, False, False, True]
+
+
+def test_the_map_before_lives_until_the_next_is_prepared(keeper):
+    before = keeper.take("a")
+    keeper.wait()
+    with keeper.busy():
+        between, newest = keeper.take("b"), keeper.take("c")
+        gc.collect()
+        assert before() is not None
+    keeper.wait()
+    gc.collect()
+    assert (before(), between()) == (None, None)
+    assert newest() is not None
