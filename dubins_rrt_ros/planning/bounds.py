@@ -11,6 +11,7 @@ from . import dubins
 from ._kernels import COMPILED
 from ._kernels.widest import Flood
 from .clearance import MARGIN, ClearanceField
+from .distance import DistanceField
 from .map import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap
 from .problem import Problem
 
@@ -50,17 +51,19 @@ class Way:
     narrowest: Point
 
 
-def lower_bound(problem: Problem) -> float:
-    """A length that no path of the problem falls below [m].
+def lower_bound(problem: Problem, field: DistanceField | None = None) -> float:
+    """A length that no path of the problem falls below [m]; infinite where `field` tells that there is none.
 
     It is that of the Dubins curve without obstacles; or, where the goal has a tolerance, the straight line to where that
-    begins and the turn to the first heading that will do.
+    begins and the turn to the first heading that will do. With `field`, the distances to the goal, it is no less than the way
+    around the obstacles.
     """
     start, goal, radius = problem.start, problem.goal, problem.vehicle.turning_radius
+    around = float(field.at(np.array([start[:2]]))[0]) if field else 0.0
     if problem.exact_goal:
-        return dubins.shortest(start, goal, radius).length
+        return max(around, dubins.shortest(start, goal, radius).length)
     turn = abs(math.remainder(goal[2] - start[2], math.tau)) - problem.yaw_tolerance
-    return max(0.0, math.dist(start[:2], goal[:2]) - problem.goal_tolerance_xy, radius * turn)
+    return max(0.0, around, math.dist(start[:2], goal[:2]) - problem.goal_tolerance_xy, radius * turn)
 
 
 def nearest_in_map(map: Map, point: Point) -> Point:

@@ -1,9 +1,12 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The distance to a goal around obstacles, for a disc that can turn on the spot, at every cell of a coarse raster.
+"""How far places are from a source around obstacles, for a disc that can turn on the spot: no path of the disc is shorter.
 
-It is the solution of the eikonal equation |grad cost| = 1 by first-order upwind differences, as in fast marching. Cells whose
-cost fell wait in a queue, first in, first out, to let it count for their neighbours: that needs no heap, and the costs at which
-nothing falls any more do not depend on the order.
+The map is cut into squares, each a block of the clearance's cells, and on those that may hold a free point the cost is that of
+`Eikonal`: continuous, and linear on triangles.
+
+Why no path is shorter. No triangle has a gradient above 1, and where the source is the cost is not above 0. A path of the disc
+stays within squares that may hold a free point, and where two of them meet, in an edge or a node, both have the same cost: so
+along the path the cost is continuous and rises by a metre per metre at most. How the nodes got their costs does not matter.
 """
 
 import cython
@@ -11,127 +14,235 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
-    from cython.cimports.libc.math import fabs, sqrt
+    from cython.cimports.dubins_rrt_ros.planning._kernels.eikonal import FAR, Eikonal, squared_slopes
+    from cython.cimports.libc.math import NAN, atan2, sqrt
 else:
-    from math import fabs, sqrt
+    from math import atan2, sqrt
+    from math import nan as NAN
 
     from .clearance import Clearance
+    from .eikonal import FAR, Eikonal, squared_slopes
 
-#: A smaller fall of a cost is rounding [cells].
-LEAST_FALL = cython.declare(cython.double, 1e-9)
+#: Rounding, as a share and in metres.
+ROUNDING = cython.declare(cython.double, 1e-9)
+
+
+def free_squares(clearance: Clearance, block: cython.int, need: cython.double):
+    """Which squares of `block` x `block` cells may hold a point with the clearance `need` [m]: all others hold none.
+
+    Returns:
+        (rows + 3, columns + 3) int8 for rows x columns squares, in a border of zeros: one before them and two behind.
+    """
+    rows: cython.int = clearance.field.shape[0]
+    columns: cython.int = clearance.field.shape[1]
+    found = np.zeros(((rows + block - 1) // block + 3, (columns + block - 1) // block + 3), np.int8)
+    free: cython.schar[:, ::1] = found
+    row: cython.int
+    column: cython.int
+    with cython.nogil:
+        for row in range(rows):
+            for column in range(columns):
+                if not free[row // block + 1, column // block + 1] and may_be_free(clearance, row, column, need):
+                    free[row // block + 1, column // block + 1] = 1
+    return found
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, need: cython.double) -> cython.bint:
+    """Whether a cell has a quarter whose centre is at most half a diagonal of it short of the clearance."""
+    side: cython.double = clearance.resolution
+    bound: cython.double = cython.cast(cython.double, clearance.field[row, column])
+    if bound < 0 or bound >= need:
+        return bound >= 0
+    enough: cython.double = need - side * (sqrt(0.125) + ROUNDING)
+    quarter: cython.int
+    for quarter in range(4):
+        if clearance.exact((column + 0.25 + 0.5 * (quarter & 1)) * side, (row + 0.25 + 0.5 * (quarter >> 1)) * side) >= enough:
+            return True
+    return False
 
 
 @cython.cclass
-class Eikonal:
-    """The equation on cells, each a block of `block` x `block` cells of the clearance's raster, in a border of impassable cells.
+class CostField:
+    """The costs of the nodes. Square `row * width + column` has the nodes of this number, of the next, and of those a row on.
 
     Attributes:
-        shape: (rows, columns) with the border; `row * columns + column` is the index of a cell.
+        shape: (rows, columns) of the nodes with their border; `columns` is the width.
+        side: of a square [m].
+        is_bound: whether the costs are bounds; before `make_bound` they can be too high by some hundredths.
     """
 
-    shape = cython.declare(tuple, visibility="readonly")
-    clearance: Clearance
-    block: cython.int
-    width: cython.int
-    passable: cython.schar[::1]
-    cost: cython.double[::1]
-    queue: cython.int[::1]
-    is_waiting: cython.schar[::1]
-    first: cython.int
-    waiting: cython.int
-
-    def __init__(self, clearance: Clearance, block: cython.int, need: cython.double):
-        """A cell is passable where the clearance in it may be `need` [m]."""
-        self.clearance, self.block = clearance, block
-        rows: cython.int = (clearance.field.shape[0] + block - 1) // block
-        columns: cython.int = (clearance.field.shape[1] + block - 1) // block
-        self.shape, self.width = (rows + 2, columns + 2), columns + 2
-        cells = (rows + 2) * (columns + 2)
-        self.passable, self.is_waiting = np.zeros(cells, np.int8), np.zeros(cells, np.int8)
-        self.cost, self.queue = np.full(cells, np.inf), np.empty(cells, np.int32)
-        self.first = self.waiting = 0
-        row: cython.int
-        column: cython.int
-        with cython.nogil:
-            for row in range(1, rows + 1):
-                for column in range(1, columns + 1):
-                    self.passable[row * self.width + column] = self.may_be_free(row, column, need)
-
-    def solve(self, cells: cython.int[::1], costs: cython.double[::1]):
-        """Flood from where the goal is.
-
-        Args:
-            cells: (n,) int32 where to begin; impassable ones are left out.
-            costs: (n,) float64 the costs there, in sides of a cell.
-
-        Returns:
-            float64 of `shape`: the costs of all cells, in sides of a cell; infinite for what is not reached.
+    def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double):
         """
-        i: cython.Py_ssize_t
+        Args:
+            block: how many cells of the clearance's raster are the side of a square.
+            free: what `free_squares` returns for it.
+            source: (x, y) in the map's frame [m].
+            tolerance: the source is all that is within this distance of it [m].
+        """
+        self.clearance, self.side = clearance, block * clearance.resolution
+        self.shape, self.width, self.size = free.shape, free.shape[1], free.size
+        x: cython.double = source[0]
+        y: cython.double = source[1]
+        self.tolerance = tolerance / self.side
+        self.column, self.row = self.place(x, y)
+        self.equation = Eikonal(free)
+        self.equation.solve(self.column, self.row, self.tolerance)
+        self.free, self.cost = self.equation.free, np.empty(free.size)
+        self.is_bound = self.is_flat = False
         with cython.nogil:
-            for i in range(cells.shape[0]):
-                if self.passable[cells[i]]:
-                    self.offer(cells[i], costs[i])
-            while self.waiting > 0:
-                self.serve()
+            self.measure(0)
+
+    def prepare_bound(self):
+        """Do the long part of `make_bound`, which leaves the costs as they are."""
+        if not self.is_flat:
+            self.equation.flatten()
+            self.is_flat = True
+
+    def make_bound(self):
+        """Make the costs as much lower as it takes that no path is shorter."""
+        if self.is_bound:
+            return
+        self.prepare_bound()
+        self.is_bound = True
+        with cython.nogil:
+            self.measure(0)
+            # At a point of the source the nodes around it have no more than their distances to it: sqrt(1 / 2) between them. The
+            # cost of the source is taken as it was before it was rounded down, so that it falls to 0 at least.
+            self.measure(sqrt(0.5) if self.tolerance > 0
+                         else (self.at_place(self.column, self.row) + ROUNDING) / (1 - ROUNDING) / self.side)
+
+    def nodes(self):
+        """float64 of `shape`: the costs of the nodes [m]; 1e300 where no way is."""
         return np.asarray(self.cost).reshape(self.shape)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def may_be_free(self, row: cython.int, column: cython.int, need: cython.double) -> cython.bint:
-        """Whether a block has a cell whose centre is at most half a diagonal short of the clearance."""
-        side: cython.double = self.clearance.resolution
-        enough: cython.double = need - side * sqrt(0.5)
-        bound: cython.double
-        i: cython.int
-        j: cython.int
-        end: cython.int = min(row * self.block, cython.cast(cython.int, self.clearance.field.shape[0]))
-        right: cython.int = min(column * self.block, cython.cast(cython.int, self.clearance.field.shape[1]))
-        for i in range((row - 1) * self.block, end):
-            for j in range((column - 1) * self.block, right):
-                bound = cython.cast(cython.double, self.clearance.field[i, j])
-                if bound >= 0 and (bound >= enough or self.clearance.exact((j + 0.5) * side, (i + 0.5) * side) >= enough):
-                    return True
-        return False
+    def values(self, points: cython.double[:, ::1], out: cython.double[::1]):
+        """Write the costs at (n, 2) points of the map's frame to `out` [m]; 1e300 where no way is."""
+        i: cython.Py_ssize_t
+        with cython.nogil:
+            for i in range(points.shape[0]):
+                out[i] = self.at(points[i, 0], points[i, 1])
+
+    def descent(self, points: cython.double[:, ::1], out: cython.double[::1]):
+        """Write where the cost falls at (n, 2) points of the map's frame to `out` [rad]; NaN where there is none."""
+        i: cython.Py_ssize_t
+        with cython.nogil:
+            for i in range(points.shape[0]):
+                out[i] = self.heading(points[i, 0], points[i, 1])
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def serve(self) -> cython.void:
-        """Let the neighbours of the first cell in the queue have costs by what it costs."""
-        cell: cython.int = self.queue[self.first]
-        self.first = (self.first + 1) % cython.cast(cython.int, self.queue.shape[0])
-        self.waiting -= 1
-        self.is_waiting[cell] = 0
-        self.update(cell + 1)
-        self.update(cell - 1)
-        self.update(cell + self.width)
-        self.update(cell - self.width)
+    def at(self, x: cython.double, y: cython.double) -> cython.double:
+        """The cost at a point of the map's frame, not below 0; 1e300 where no way is."""
+        column: cython.double
+        row: cython.double
+        column, row = self.place(x, y)
+        return self.at_place(column, row)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def update(self, cell: cython.int) -> cython.void:
-        """Offer a passable cell its cost by its neighbours: the way leads between the cheapest in its row and in its column."""
-        if not self.passable[cell]:
-            return
-        along: cython.double = min(self.cost[cell - 1], self.cost[cell + 1])
-        across: cython.double = min(self.cost[cell - self.width], self.cost[cell + self.width])
-        if fabs(along - across) < 1:
-            self.offer(cell, (along + across + sqrt(2 - (along - across) * (along - across))) / 2)
-        else:
-            self.offer(cell, min(along, across) + 1)
+    def at_place(self, column: cython.double, row: cython.double) -> cython.double:
+        """The cost at a column and row, not below 0; 1e300 where no way is."""
+        square: cython.int = self.square_at(column, row)
+        if square < 0 or not self.free[square] or self.cost[square] >= FAR:
+            return FAR
+        return max(0.0, self.within(square, column - square % self.width, row - square // self.width))
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def offer(self, cell: cython.int, cost: cython.double) -> cython.void:
-        """Let a cell have a cost that is lower than its own, and wait in the queue to pass it on."""
-        if cost >= self.cost[cell] - LEAST_FALL:
-            return
-        self.cost[cell] = cost
-        if not self.is_waiting[cell]:
-            self.is_waiting[cell] = 1
-            self.queue[(self.first + self.waiting) % cython.cast(cython.int, self.queue.shape[0])] = cell
-            self.waiting += 1
+    def heading(self, x: cython.double, y: cython.double) -> cython.double:
+        """The heading in which the cost falls at a point, averaged over the nodes around it; NaN where it falls at none."""
+        column: cython.double
+        row: cython.double
+        column, row = self.place(x, y)
+        square: cython.int = self.square_at(column, row)
+        if square < 0:
+            return NAN
+        column -= square % self.width
+        row -= square // self.width
+        along: cython.double = 0
+        across: cython.double = 0
+        weight: cython.double
+        node: cython.int
+        corner: cython.int
+        for corner in range(4):
+            weight = (column if corner & 1 else 1 - column) * (row if corner & 2 else 1 - row)
+            node = square + (corner & 1) + (self.width if corner & 2 else 0)
+            along += weight * self.fall(node, 1, self.width)
+            across += weight * self.fall(node, self.width, 1)
+        if along == 0 and across == 0:
+            return NAN
+        return atan2(self.clearance.sin_yaw * along + self.clearance.cos_yaw * across,
+                     self.clearance.cos_yaw * along - self.clearance.sin_yaw * across)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def place(self, x: cython.double, y: cython.double) -> tuple[cython.double, cython.double]:
+        """Column and row of a point of the map's frame, whole numbers at the nodes."""
+        dx: cython.double = x - self.clearance.x0
+        dy: cython.double = y - self.clearance.y0
+        return (1 + (self.clearance.cos_yaw * dx + self.clearance.sin_yaw * dy) / self.side,
+                1 + (self.clearance.cos_yaw * dy - self.clearance.sin_yaw * dx) / self.side)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def square_at(self, column: cython.double, row: cython.double) -> cython.int:
+        """The square that holds a place, or -1 beyond the squares."""
+        columns: cython.int = self.width - 3
+        rows: cython.int = self.size // self.width - 3
+        if not (1 <= column <= columns + 1 and 1 <= row <= rows + 1):
+            return -1
+        return min(cython.cast(cython.int, row), rows) * self.width + min(cython.cast(cython.int, column), columns)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def within(self, square: cython.int, along: cython.double, across: cython.double) -> cython.double:
+        """The cost at a place of a square, by its share of the side along the row and across."""
+        here: cython.double = self.cost[square]
+        right: cython.double = self.cost[square + 1]
+        above: cython.double = self.cost[square + self.width]
+        beyond: cython.double = self.cost[square + self.width + 1]
+        upwards: cython.double
+        downwards: cython.double
+        upwards, downwards = squared_slopes(here, right, above, beyond)
+        if upwards <= downwards:
+            if along >= across:
+                return here + along * (right - here) + across * (beyond - right)
+            return here + across * (above - here) + along * (beyond - above)
+        if along + across <= 1:
+            return here + along * (right - here) + across * (above - here)
+        return beyond + (1 - along) * (above - beyond) + (1 - across) * (right - beyond)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def fall(self, node: cython.int, step: cython.int, beside: cython.int) -> cython.double:
+        """By how much the cost falls along an edge from a node to the cheaper neighbour by a step; negative to that before."""
+        ahead: cython.double = FAR
+        behind: cython.double = FAR
+        if self.free[node] or self.free[node - beside]:
+            ahead = self.cost[node + step]
+        if self.free[node - step] or self.free[node - step - beside]:
+            behind = self.cost[node - step]
+        if ahead < behind:
+            return max(0.0, self.cost[node] - ahead)
+        return -max(0.0, self.cost[node] - behind) if behind < FAR else 0.0
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def measure(self, source: cython.double) -> cython.void:
+        """Take the costs from the equation, in metres, and rounded down; `source` is the most that a place of the source has."""
+        node: cython.int
+        for node in range(self.size):
+            self.cost[node] = self.equation.cost[node]
+            if self.cost[node] < FAR:
+                self.cost[node] = (self.cost[node] - source) * self.side * (1 - ROUNDING) - ROUNDING

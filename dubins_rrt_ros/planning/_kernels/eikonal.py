@@ -1,0 +1,320 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""The distance from a source around obstacles, on a lattice of squares: the equation |grad cost| = 1, nowhere exceeded.
+
+Every free square is split into two triangles, along the diagonal that makes the steeper one less steep; the cost is linear on
+both. Its gradient is at most 1 on each, and nearly so on almost all.
+
+At first the equation is solved by upwind differences of first order, about in the order of the costs as in fast marching. Where
+ways fan out, around the source and around corners, that is too steep. So it is solved again with a gradient as much below 1
+there as it came out above, node by node in the order noted; a node that overtakes an earlier one passes its cost on once more.
+What is still too steep then, a few triangles by little, is cured by height: all costs between two levels are pressed together
+by the greatest gradient between these.
+"""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.libc.math import floor, hypot, sqrt
+else:
+    from math import floor, hypot, sqrt
+
+#: The cost of what is not reached.
+FAR = cython.declare(cython.double, 1e300)
+#: A smaller fall of a cost is not passed on [squares].
+LEAST_FALL = cython.declare(cython.double, 1e-4)
+#: How often the equation is solved again.
+REPEATS = cython.declare(cython.int, 3)
+#: So many levels of the cost make a side of a square.
+LEVELS = cython.declare(cython.double, 4)
+#: The cosine of pi / 8: so much flatter than a cone, the triangles around its tip are not too steep.
+FLATTER = cython.declare(cython.double, 0.9238795325112867)
+#: Where a node is: in no queue, in the queue, or among those whose turn comes later.
+IDLE = cython.declare(cython.schar, 0)
+QUEUED = cython.declare(cython.schar, 1)
+POSTPONED = cython.declare(cython.schar, 2)
+
+
+@cython.cclass
+class Eikonal:
+    """The costs of nodes, in sides of a square.
+
+    Square `row * width + column` has the nodes of this number, of the next, and of those a row on. A border of squares is not
+    free: the first row and column and the last two.
+    """
+
+    def __init__(self, free):
+        """`free` is (rows, columns) int8, not 0 for each free square; `columns` is the width."""
+        self.width, self.size = free.shape[1], free.size
+        self.free = free.reshape(-1)
+        self.cost, self.gradient, self.slope = np.full(free.size, FAR), np.ones(free.size), np.zeros(free.size)
+        self.state = np.zeros(free.size, np.int8)
+        self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
+        self.rank = np.full(free.size, free.size, np.int32)
+        self.first = self.waiting = self.postponed = self.ordered = 0
+        self.limit, self.last = 1, free.size
+
+    def solve(self, column: cython.double, row: cython.double, reach: cython.double):
+        """Find the costs from all within `reach` of a place on; the nodes around it get no more than their distances to that.
+        Here and there they are too steep."""
+        with cython.nogil:
+            self.seed(column, row, reach)
+            self.flood()
+
+    def flatten(self):
+        """Make the costs that `solve` found lower where they are too steep, once."""
+        _: cython.int
+        with cython.nogil:
+            levels: cython.double = self.limit * LEVELS  # no cost is above the limit, and none rises
+            self.limit = FAR
+            for _ in range(REPEATS):
+                self.slow_down()
+        steepest: cython.double[::1] = np.ones(int(levels) + 2)
+        heights: cython.double[::1] = np.zeros(steepest.shape[0])
+        with cython.nogil:
+            self.find_steepest(steepest)
+            self.press(steepest, heights)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def seed(self, column: cython.double, row: cython.double, reach: cython.double) -> cython.void:
+        """Begin at the nodes of all free squares that are within reach of a place."""
+        columns: cython.double = self.width - 3
+        rows: cython.double = self.size // self.width - 3
+        left: cython.int = cython.cast(cython.int, min(max(1.0, floor(column - reach)), columns))
+        right: cython.int = cython.cast(cython.int, max(0.0, min(floor(column + reach), columns)))
+        low: cython.int = cython.cast(cython.int, min(max(1.0, floor(row - reach)), rows))
+        high: cython.int = cython.cast(cython.int, max(0.0, min(floor(row + reach), rows)))
+        i: cython.int
+        j: cython.int
+        node: cython.int
+        corner: cython.int
+        for i in range(low, high + 1):
+            for j in range(left, right + 1):
+                if not self.free[i * self.width + j] or hypot(
+                        max(0.0, max(j - column, column - j - 1)), max(0.0, max(i - row, row - i - 1))) > reach:
+                    continue
+                for corner in range(4):
+                    node = (i + (corner >> 1)) * self.width + j + (corner & 1)
+                    self.rank[node] = -1
+                    self.offer(node, FLATTER * max(0.0, hypot(j + (corner & 1) - column, i + (corner >> 1) - row) - reach))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def flood(self) -> cython.void:
+        """Let costs pass from node to node until none falls, and note in which order the nodes had their turns."""
+        node: cython.int
+        while self.waiting + self.postponed > 0:
+            if self.waiting == 0:
+                self.raise_limit()
+                continue
+            node = self.dequeue()
+            if self.rank[node] == self.size:
+                self.rank[node] = self.ordered
+                self.order[self.ordered] = node
+                self.ordered += 1
+            if self.free[node] or self.free[node - self.width]:
+                self.pass_on(node, node + 1)
+            if self.free[node - 1] or self.free[node - self.width - 1]:
+                self.pass_on(node, node - 1)
+            if self.free[node] or self.free[node - 1]:
+                self.pass_on(node, node + self.width)
+            if self.free[node - self.width] or self.free[node - self.width - 1]:
+                self.pass_on(node, node - self.width)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def pass_on(self, node: cython.int, neighbour: cython.int) -> cython.void:
+        """Let the cost of a node count for a neighbour that costs more."""
+        if self.falls_behind(neighbour, node):
+            self.offer(neighbour, self.update(neighbour, self.gradient[neighbour]))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def offer(self, node: cython.int, cost: cython.double) -> cython.void:
+        """Let a node have a cost that is lower than its own, and wait to pass it on: at once only where it is below the limit."""
+        if cost >= self.cost[node] - LEAST_FALL:
+            return
+        self.cost[node] = cost
+        if cost < self.limit:
+            self.enqueue(node)
+        elif self.state[node] == IDLE:
+            self.state[node] = POSTPONED
+            self.later[self.postponed] = node
+            self.postponed += 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def raise_limit(self) -> cython.void:
+        """Raise the limit by a square, and queue what is below it now."""
+        count: cython.int = self.postponed
+        node: cython.int
+        i: cython.int
+        self.limit += 1
+        self.postponed = 0
+        for i in range(count):
+            node = self.later[i]
+            if self.state[node] != POSTPONED:  # it was queued meanwhile
+                continue
+            if self.cost[node] < self.limit:
+                self.enqueue(node)
+            else:
+                self.later[self.postponed] = node
+                self.postponed += 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def enqueue(self, item: cython.int) -> cython.void:
+        """Put a node or a square behind all in the queue, unless it is there."""
+        if self.state[item] == QUEUED:
+            return
+        self.state[item] = QUEUED
+        end: cython.int = self.first + self.waiting
+        self.queue[end if end < self.size else end - self.size] = item
+        self.waiting += 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def dequeue(self) -> cython.int:
+        """Take the first node or square from the queue."""
+        item: cython.int = self.queue[self.first]
+        self.state[item] = IDLE
+        self.first = self.first + 1 if self.first + 1 < self.size else 0
+        self.waiting -= 1
+        return item
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def update(self, node: cython.int, gradient: cython.double) -> cython.double:
+        """The cost of a node by its neighbours: the least over the free squares around it."""
+        before: cython.double = self.cost[node - 1]
+        behind: cython.double = self.cost[node + 1]
+        below: cython.double = self.cost[node - self.width]
+        above: cython.double = self.cost[node + self.width]
+        least: cython.double = FAR
+        if self.free[node] and self.free[node - 1] and self.free[node - self.width] and self.free[node - self.width - 1]:
+            return upwind(min(before, behind), min(below, above), gradient)
+        if self.free[node]:
+            least = upwind(behind, above, gradient)
+        if self.free[node - 1]:
+            least = min(least, upwind(before, above, gradient))
+        if self.free[node - self.width]:
+            least = min(least, upwind(behind, below, gradient))
+        if self.free[node - self.width - 1]:
+            least = min(least, upwind(before, below, gradient))
+        return least
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def slow_down(self) -> cython.void:
+        """Solve again, node by node in order, with a gradient that makes up for the steepest square around each."""
+        square: cython.int
+        node: cython.int
+        i: cython.int
+        for square in range(self.size):
+            if self.free[square] and self.cost[square] < FAR:
+                self.slope[square] = self.steepest(square)
+        for i in range(self.ordered):
+            node = self.order[i]
+            self.gradient[node] /= max(1.0, max(max(self.slope[node], self.slope[node - 1]),
+                                                max(self.slope[node - self.width], self.slope[node - self.width - 1])))
+            self.cost[node] = self.update(node, self.gradient[node])
+            self.last = i
+            if (self.falls_behind(node + 1, node) or self.falls_behind(node - 1, node)
+                    or self.falls_behind(node + self.width, node) or self.falls_behind(node - self.width, node)):
+                self.enqueue(node)
+                self.flood()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def falls_behind(self, neighbour: cython.int, node: cython.int) -> cython.bint:
+        """Whether a neighbour that had its turn costs more than a node, so that it may be reached from there."""
+        return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + LEAST_FALL
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def find_steepest(self, steepest: cython.double[::1]) -> cython.void:
+        """Find the greatest gradient, and at least 1, of the squares that have each level of the cost."""
+        square: cython.int
+        level: cython.int
+        slope: cython.double
+        low: cython.double
+        high: cython.double
+        for square in range(self.size):
+            if not self.free[square] or self.cost[square] >= FAR:
+                continue
+            slope = self.steepest(square)
+            if slope <= 1:
+                continue
+            low = min(min(self.cost[square], self.cost[square + 1]),
+                      min(self.cost[square + self.width], self.cost[square + self.width + 1]))
+            high = max(max(self.cost[square], self.cost[square + 1]),
+                       max(self.cost[square + self.width], self.cost[square + self.width + 1]))
+            for level in range(cython.cast(cython.int, LEVELS * low), cython.cast(cython.int, LEVELS * high) + 1):
+                steepest[level] = max(steepest[level], slope)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def press(self, steepest: cython.double[::1], heights: cython.double[::1]) -> cython.void:
+        """Make every level so much lower that no gradient is above 1; `heights` has room for where they begin."""
+        level: cython.int
+        node: cython.int
+        heights[0] = 0
+        for level in range(1, heights.shape[0]):
+            heights[level] = heights[level - 1] + 1 / (LEVELS * steepest[level - 1])
+        for node in range(self.size):
+            if self.cost[node] < FAR:
+                level = cython.cast(cython.int, LEVELS * self.cost[node])
+                self.cost[node] = heights[level] + (self.cost[node] - level / LEVELS) / steepest[level]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def steepest(self, square: cython.int) -> cython.double:
+        """The greater gradient of a square's triangles, or 1 where it is less."""
+        upwards: cython.double
+        across: cython.double
+        upwards, across = squared_slopes(self.cost[square], self.cost[square + 1], self.cost[square + self.width],
+                                         self.cost[square + self.width + 1])
+        return sqrt(min(upwards, across)) if upwards > 1 and across > 1 else 1.0
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def squared_slopes(here: cython.double, right: cython.double, above: cython.double,
+                   beyond: cython.double) -> tuple[cython.double, cython.double]:
+    """The squares of the greater gradients of a square's triangles, if it is split from `here` to `beyond`, and if across."""
+    bottom: cython.double = (right - here) * (right - here)
+    top: cython.double = (beyond - above) * (beyond - above)
+    left: cython.double = (above - here) * (above - here)
+    side: cython.double = (beyond - right) * (beyond - right)
+    return max(bottom + side, left + top), max(bottom + left, top + side)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def upwind(one: cython.double, other: cython.double, gradient: cython.double) -> cython.double:
+    """What a node costs by its neighbours along the row and across, a square away each."""
+    apart: cython.double = one - other
+    if apart >= gradient:
+        return other + gradient
+    if apart <= -gradient:
+        return one + gradient
+    return 0.5 * (one + other + sqrt(2 * gradient * gradient - apart * apart))
