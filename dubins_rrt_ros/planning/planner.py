@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from . import reasons
-from .audit import Audit, audit, prepare_audit
+from .audit import Audit, audit
 from .bounds import lower_bound
 from .clearance import ClearanceField
+from .distance import DistanceField, free_blocks
+from .headings import FOLLOW_FIELD
 from .map import Map
 from .path import Path
 from .problem import Problem
@@ -28,10 +30,15 @@ SAME = 1e-9
 LEAST_IMPROVEMENT = 1e-6
 
 
-def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False) -> None:
-    """Compute what depends on map and vehicle alone, so that requests need not wait for it: it is kept as long as the map."""
-    ClearanceField.of(map, allow_unknown).components(vehicle.robot_radius)
-    prepare_audit(map, allow_unknown)
+def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: Map | None = None) -> None:
+    """Compute what depends on map and vehicle alone, so that requests need not wait for it: it is kept as long as the map.
+
+    Args:
+        previous: a map that was prepared before; where this one differs from it in a part, only that is computed.
+    """
+    field = ClearanceField.of(map, allow_unknown, previous)
+    field.components(vehicle.robot_radius)
+    free_blocks(field, vehicle.robot_radius)
 
 
 def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = lambda: False,
@@ -106,23 +113,27 @@ class _Request:
 
     def _search(self, field: ClearanceField, cancel: Callable[[], bool], on_progress: Callable[[Progress], None]) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
-        search = Search(self._problem, self._settings, field)
+        search = Search(self._problem, self._settings, field, self._distances_if_needed(field))
         best, reported = math.inf, 0.0
-        ended = self._out_of_time
-        while not ended:
-            if cancel():
-                search.shorten(ended=True)
-                return self._best_of(search, cancelled=True) or self._cancelled(search.tree, search.samples)
+        cancelled = False
+        while not (search.done or ((self._out_of_time or cancelled) and search.may_end)):
             search.grow()
+            cancelled = cancelled or cancel()
             if search.best >= 0 and self._time_to_first is None:
                 self._time_to_first = self._elapsed
-            ended = search.done or self._out_of_time
-            search.shorten(ended)
-            improved = search.length is not None and search.length < best - LEAST_IMPROVEMENT
+            improved = search.best >= 0 and search.length < best - LEAST_IMPROVEMENT
             if improved or self._elapsed - reported >= REPORT_INTERVAL:
                 best, reported = search.length or math.inf, self._elapsed
                 on_progress(Progress(search.samples, reported, search.length, improved, lambda: self._snapshot(search)))
-        return self._best_of(search) or self._failed(search, field)
+        if search.best >= 0:
+            if self._settings.informed:
+                self._bound = lower_bound(self._problem, search.make_bound())
+            return self._best_of(search, cancelled=cancelled and not search.done)
+        return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
+
+    def _distances_if_needed(self, field: ClearanceField) -> DistanceField | None:
+        needed = self._settings.informed or self._settings.heading_sampling in FOLLOW_FIELD
+        return DistanceField.to_goal(self._problem, field) if needed else None
 
     def _start_reaches_goal(self) -> bool:
         start, goal = self._problem.start, self._problem.goal
@@ -153,7 +164,9 @@ class _Request:
         else:
             status, what, more = Status.TIMEOUT, f"No path within planning_time {self._settings.planning_time:g} s", "time"
         why, culprit = reasons.after_search(self._problem, field, tree, more)
-        if self._settings.goal_bias == 0 and self._problem.exact_goal:
+        if search.samples == 0 and culprit is None:
+            why = f"allow more {more}"
+        elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
             why, culprit = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
         return self._plan(status, f"{what}: {drawn}; {why}.", tree, samples=search.samples, culprit=culprit)
 
@@ -183,8 +196,8 @@ def _success_message(plan: Plan, running: bool) -> str:
     so_far = " so far" if running else ""
     end = "cancelled after " if plan.cancelled else "after "
     above = f", at most {100 * plan.gap:.1f} % above the shortest possible" if math.isfinite(plan.gap) else ""
-    message = (f"Path of {plan.length:.2f} m{so_far}{above}, "
-               f"{end}{plan.samples} samples in {plan.planning_time:.3g} s")
+    drawn = f"{end}{plan.samples} sample{'' if plan.samples == 1 else 's'}" if plan.samples else "before the first sample"
+    message = f"Path of {plan.length:.2f} m{so_far}{above}, {drawn} in {plan.planning_time:.3g} s"
     if plan.problem.exact_goal:
         return message + "."
     off = math.dist(plan.path.end[:2], plan.problem.goal[:2])

@@ -19,11 +19,11 @@ class Settings:
     planning_time: float = option(1.0, "the time limit", unit="s", low=0.001, high=3600.0)
     goal_bias: float = option(0.05, "the share of samples drawn at the goal", low=0.0, high=1.0)
     step_size: float = option(0.0, "the longest edge, rewired ones too; 0 is unlimited", unit="m", low=0.0, high=1e6)
-    heading_sampling: str = option("uniform", "headings of the samples: uniform in [0, 2 pi); goal, straight towards the goal; "
+    heading_sampling: str = option("mixed", "headings of the samples: uniform in [0, 2 pi); goal, straight towards the goal; "
                                    "field, along the way there around obstacles; mixed, a fifth uniform, the others near field",
                                    choices=("uniform", "goal", "field", "mixed"))
-    informed: bool = option(True, "rrt_star draws only where its best path can still become shorter")
-    shortcut: bool = option(True, "the best path is shortened by Dubins curves between poses along it, of any length")
+    informed: bool = option(True, "hybrid A* finds a first path, and rrt_star then draws only where it can still become shorter")
+    shortcut: bool = option(True, "each best path is shortened by Dubins shortcuts and detours, and the tree goes on from it")
     path_spacing: float = option(0.05, "the largest distance between two poses of a published path", unit="m",
                                  low=0.001, high=1000.0)
     seed: int = option(-1, "the seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)

@@ -52,6 +52,13 @@ def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
         assert figure in out
 
 
+@pytest.mark.parametrize(("flags", "needs_samples"), [([], False), (["--no-informed", "--no-shortcut"], True)])
+def test_rrt_needs_samples_only_where_hybrid_a_star_is_left_out(hall, flags, needs_samples, capsys):
+    status, out, _ = run(hall, *REQUEST, *BUDGET, "--planner", "rrt", "--samples", "9000", *flags, "--json", "-", capsys=capsys)
+    drawn = json.loads(out)["samples"]
+    assert status == 0 and (0 < drawn < 9000 if needs_samples else drawn == 0)
+
+
 def test_json_on_standard_output_stands_alone(hall, capsys):
     status, out, error = run(hall, *REQUEST, *BUDGET, "--json", "-", capsys=capsys)
     document = json.loads(out)
@@ -212,7 +219,7 @@ def test_ctrl_c_before_a_path_is_cancelled(hall):
     """The goal lies behind a gap that the vehicle fits through only by a hair."""
     Path("gap.wkt").write_text(shapely.box(-6, -5, 6, 5).difference(
         shapely.union_all([shapely.box(-1, -5, 1, -0.2001), shapely.box(-1, 0.2001, 1, 5)])).wkt)
-    budget = ["--samples", "10000000", "--planning-time", "3600", "--goal-bias", "0", "--seed", "4"]
+    budget = ["--samples", "10000000", "--planning-time", "3600", "--goal-bias", "0", "--no-informed", "--seed", "4"]
     status, out, shown = on_a_terminal(["gap.wkt", "--start", "-4", "-3", "2", "--goal", "3.5", "3", "2", *budget],
                                        interrupt_at=b"samples/s")
     assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown

@@ -31,7 +31,7 @@ PARAMETERS = {
     "planning_time": (DOUBLE, 1.0, 0.0),
     "goal_bias": (DOUBLE, None, 1.5),
     "step_size": (DOUBLE, 0.0, -1.0),
-    "heading_sampling": (STRING, None, "random"),
+    "heading_sampling": (STRING, "mixed", "random"),
     "informed": (BOOL, True, 1),
     "shortcut": (BOOL, True, 1),
     "goal_tolerance_xy": (DOUBLE, None, -0.1),
@@ -63,7 +63,8 @@ def on_the_yard(module_planners, defaults, map_file):
 
 def changed(client, **values):
     """Set what is wanted, all else that these tests change as in QUICK and by default."""
-    usual = {"planner": "rrt_star", "path_spacing": 0.05, "turning_radius": 1.0, "allow_unknown": False}
+    usual = {"planner": "rrt_star", "path_spacing": 0.05, "turning_radius": 1.0, "allow_unknown": False, "informed": True,
+             "shortcut": True, "heading_sampling": "mixed"}
     assert client.set_parameters(**usual | QUICK | values).successful
 
 
@@ -112,6 +113,18 @@ def test_a_change_holds_from_the_next_request_on(on_the_yard):
     assert (told["planner"], told["seed"]) == ("rrt", "7")
     assert 0.05 < longest_step(path) <= 0.5 + 1e-9
     assert float(told["max_curvature"]) == pytest.approx(2.0)
+
+
+def test_the_plain_algorithm_needs_samples_for_its_first_path_and_comes_less_far(on_the_yard):
+    plain = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
+    for planner in ("rrt", "rrt_star"):
+        changed(on_the_yard, planner=planner)
+        _, told = on_the_yard.plan(START, GOAL)
+        changed(on_the_yard, planner=planner, **plain)
+        _, told_plain = on_the_yard.plan(START, GOAL)
+        assert told["samples"] == {"rrt": "0", "rrt_star": "300"}[planner]
+        assert 0 < int(told_plain["samples"]) <= 300
+        assert float(told["path_length"]) < float(told_plain["path_length"])
 
 
 def test_allow_unknown_lets_it_drive_there(on_the_yard):

@@ -1,14 +1,21 @@
 """Random maps and problems, and the naive twins applied to them."""
 
+import importlib.util
 import math
 from functools import cache
+from itertools import pairwise
+from pathlib import Path as FilePath
 
 import naive
 import numpy as np
 import pytest
 import shapely
 
-from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Vehicle, kernels_compiled
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, PolygonMap, Problem, Vehicle, _kernels, kernels_compiled
+from dubins_rrt_ros.planning.chain import Chain
+from dubins_rrt_ros.planning.distance import DistanceField
+from dubins_rrt_ros.planning.dubins import WORDS, DubinsCurve, shortest
+from dubins_rrt_ros.planning.rrt import Search
 
 #: By how much the budgets of the tests shrink where the kernels are interpreted, some fifty times slower.
 SCALE = 1 if kernels_compiled else 20
@@ -114,3 +121,55 @@ def random_problem(rng, map):
 def empty_map(side=20.0):
     """A square without obstacles around (0, 0)."""
     return GridMap(np.zeros((40, 40)), side / 40, (-side / 2, -side / 2, 0.0))
+
+
+def field_of(problem):
+    return ClearanceField.of(problem.map, problem.allow_unknown)
+
+
+def search_on(problem, settings):
+    """A search that has not begun."""
+    field = field_of(problem)
+    return Search(problem, settings, field, DistanceField.to_goal(problem, field))
+
+
+def finish(search):
+    """The search, when it is done."""
+    while not search.done:
+        search.grow()
+    return search
+
+
+def contents(search):
+    """All bytes of a search: its tree and its path."""
+    names = ("poses", "parents", "costs", "words", "lengths")
+    return [*(getattr(search.tree, name).tobytes() for name in names), search.path and search.path.poses(0.1).tobytes()]
+
+
+def chain_of(path):
+    """A path as arrays."""
+    poses = [curve.start for curve in path.curves] + [path.end]
+    words = [0] + [WORDS.index(curve.word) for curve in path.curves]
+    lengths = [(0.0, 0.0, 0.0)] + [curve.lengths for curve in path.curves]
+    return Chain(np.array(poses), np.array(words, np.int8), np.array(lengths))
+
+
+def path_of(chain, radius):
+    """The path that arrays hold."""
+    poses = [tuple(pose) for pose in chain.poses.tolist()]
+    curves = zip(poses[:-1], chain.words[1:], chain.lengths[1:].tolist(), strict=True)
+    return Path(poses[0], poses[-1], tuple(DubinsCurve(pose, radius, WORDS[word], tuple(arcs)) for pose, word, arcs in curves))
+
+
+def chain_over(poses, radius):
+    """The shortest curves from pose to pose."""
+    curves = tuple(shortest(*pair, radius) for pair in pairwise(poses))
+    return chain_of(Path(poses[0], poses[-1], curves))
+
+
+def interpreted(name):
+    """A kernel that imports no other one as the interpreter runs it, for functions that only kernels can call."""
+    spec = importlib.util.spec_from_file_location(f"interpreted_{name}", FilePath(_kernels.__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

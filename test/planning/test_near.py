@@ -169,3 +169,40 @@ def test_the_step_is_cut_off_the_shortest_curve(algorithm):
     tree = inner.tree
     np.testing.assert_allclose(tree.poses[1], curve.pose_at(2.5), atol=1e-12)
     assert tree.costs[1] == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("algorithm", ["rrt", "rrt_star"])
+def test_nodes_that_are_forgotten_are_no_neighbours(algorithm):
+    """None of them gets a child, nor another parent; those that are kept do."""
+    inner = Inner(empty_map(), (0.0, 0.0, 0.0), 0.5)
+    samples = samples_on(empty_map(), scaled(400, least=60))
+    for sample in samples[:len(samples) // 2]:
+        inner.add(sample)
+    before = inner.tree
+    wanted = (before.poses[:, 0] > 0).astype(np.int8)
+    wanted[0] = 1
+    inner.grown.index_only(wanted)
+    for sample in samples[len(samples) // 2:]:
+        inner.add(sample, algorithm)
+        inner.grown.spread()
+    after, known = inner.tree, len(before)
+    assert len(after) > known + 5
+    new = after.parents[known:]
+    assert wanted[new[new < known]].all()
+    np.testing.assert_array_equal(after.parents[:known][wanted == 0], before.parents[wanted == 0])
+    after.check(inner.field, NEED)
+
+
+def test_more_buckets_find_the_same_neighbours():
+    """Whether they are made after each sample or never."""
+    trees = []
+    for spread in (True, False):
+        inner = Inner(MAPS[2], first_free_pose(MAPS[2]), 0.5)
+        for i, sample in enumerate(samples_on(MAPS[2], scaled(4000, least=100))):
+            inner.add(sample)
+            if spread and i % 100 == 99:
+                inner.grown.spread()
+        trees.append(inner.tree)
+    assert len(trees[0]) == len(trees[1]) > scaled(2100)
+    np.testing.assert_array_equal(trees[0].poses, trees[1].poses)
+    np.testing.assert_allclose(trees[0].costs, trees[1].costs, rtol=1e-9)

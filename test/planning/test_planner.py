@@ -237,6 +237,13 @@ def test_the_numbers_of_the_statuses():
 
 
 def test_a_goal_that_is_never_drawn_is_told(planner):
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, goal_bias=0.0, samples=50))
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, goal_bias=0.0, samples=50, informed=False))
     assert result.status is Status.NO_VALID_PATH
     assert "goal_bias 0" in result.message
+
+
+def test_hybrid_a_star_finds_a_goal_that_is_never_drawn(planner):
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, goal_bias=0.0, samples=50))
+    assert result.status is Status.NONE
+    assert result.samples == (0 if planner == "rrt" else 50)
+    assert result.length == pytest.approx(result.lower_bound, abs=1e-6)

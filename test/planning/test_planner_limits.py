@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 import pytest
-from cases import empty_map
+from cases import SCALE, empty_map
 from planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit, plan, prepare
-from dubins_rrt_ros.planning.shortcut import shortened
+from dubins_rrt_ros.planning.polish import polished
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -19,11 +19,19 @@ def planner(request):
 def test_the_time_limit_ends_it(planner, monkeypatch):
     now = iter(np.arange(1e6) / 100)
     monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
-    result = plan(hard_to_reach(), settings(planner, samples=1_000_000, planning_time=0.5))
+    result = plan(hard_to_reach(), settings(planner, samples=1_000_000, planning_time=0.5, informed=False))
     assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "of 1000000 samples drawn", "allow more time")
     assert 0 < result.samples < 1_000_000
     assert 0.5 <= result.planning_time < 1.0
-    assert f"{len(result.tree)} tree nodes" in result.message
+    assert f"{len(result.tree)} tree node" in result.message
+
+
+def test_the_time_limit_ends_hybrid_a_star(planner, monkeypatch):
+    now = iter(np.arange(1e6) / 100)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda: next(now))
+    result = plan(hard_to_reach(), settings(planner, samples=1_000_000, planning_time=0.05))
+    assert_refused(result, Status.TIMEOUT, "planning_time 0.05 s", "0 of 1000000 samples drawn")
+    assert result.samples == 0
 
 
 def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
@@ -36,7 +44,7 @@ def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
     assert not result.cancelled
 
 
-def test_what_the_time_limit_cuts_short_is_shortened_and_told(monkeypatch):
+def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
     """By a search with the samples that it took the same path is had again."""
     problem, told = Problem(walled_with_a_gap(), VEHICLE, START, GOAL), []
     with monkeypatch.context() as patched:
@@ -45,21 +53,35 @@ def test_what_the_time_limit_cuts_short_is_shortened_and_told(monkeypatch):
         result = plan(problem, settings("rrt_star", samples=1_000_000, planning_time=2.5),
                       on_progress=lambda progress: told.append(progress.length))
     assert result.status == Status.NONE
-    assert result.samples < 1_000_000
-    assert told[-1] == result.length
-    assert result.length < result.tree.costs[(result.tree.poses == GOAL).all(axis=1)].min()
+    assert 0 < result.samples < 1_000_000
+    assert told[-1] == pytest.approx(result.length, abs=1e-6)
     again = plan(problem, settings("rrt_star", samples=result.samples))
     assert again.path == result.path
 
 
-def test_the_time_to_the_first_path_is_without_its_shortcuts(planner, monkeypatch):
-    def slowly(path, field, need):
+def test_the_time_to_the_first_path_is_without_its_polishing(planner, monkeypatch):
+    def slowly(*arguments):
         time.sleep(0.05)
-        return shortened(path, field, need)
+        return polished(*arguments)
 
-    monkeypatch.setattr("dubins_rrt_ros.planning.rrt.shortened", slowly)
+    monkeypatch.setattr("dubins_rrt_ros.planning.rrt.polished", slowly)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, samples=200, goal_bias=0.5))
     assert 0 < result.time_to_first < result.planning_time - 0.05
+
+
+@pytest.mark.parametrize("informed", [False, True])
+def test_a_cancellation_waits_for_no_more_than_a_step(planner, informed):
+    """Each step takes some milliseconds, whether it expands poses, polishes a path or draws samples."""
+    times = []
+
+    def cancel():
+        times.append(time.perf_counter())
+        return False
+
+    plan(Problem(walled_with_a_gap(), VEHICLE, START, GOAL), settings(planner, informed=informed), cancel=cancel)
+    if SCALE == 1:
+        assert np.median(np.diff(times[2:])) < 0.02
+        assert np.sort(np.diff(times[2:]))[-2:].min() < 0.3  # of a machine that may be busy
 
 
 def test_the_sample_budget_ends_it(planner):
@@ -70,11 +92,18 @@ def test_the_sample_budget_ends_it(planner):
 
 def test_cancelled_before_the_first_path(planner):
     asked = []
-    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 4)
+    result = plan(hard_to_reach(), settings(planner, informed=False), cancel=lambda: asked.append(1) or len(asked) == 4)
     assert_refused(result, Status.CANCELLED, "Cancelled before a first path", "samples drawn")
     assert result.cancelled
     assert len(asked) == 4
     assert 0 < result.samples < settings(planner).samples
+
+
+def test_cancelled_while_hybrid_a_star_seeks_the_first_path(planner):
+    asked = []
+    result = plan(hard_to_reach(), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 4)
+    assert_refused(result, Status.CANCELLED, "Cancelled before a first path: 0 of", "samples drawn")
+    assert (len(asked), result.samples, len(result.tree)) == (4, 0, 1)
 
 
 def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monkeypatch):

@@ -21,7 +21,8 @@ def test_random_problems(planner):
         problem, clearance = random_problem(rng, random_maps(30)[seed % 30])
         settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=60.0,
                             step_size=float(rng.choice([0.0, 0.0, 1.0])),
-                            heading_sampling=str(rng.choice(["uniform", "goal"])))
+                            heading_sampling=str(rng.choice(["uniform", "goal", "field", "mixed"])),
+                            informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6))
         result = plan(problem, settings)
         assert result.status in POSSIBLE, result.message
         assert result.message

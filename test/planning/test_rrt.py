@@ -1,18 +1,19 @@
-"""RRT and RRT* as searches: what they draw, what they keep, and that a seed determines all of it."""
+"""RRT and RRT* as searches, mostly the plain algorithms: what they draw and what they keep."""
 
 import math
 
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, empty_map, holed_polygons, needs_compiled, scaled
+from cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
 
-from dubins_rrt_ros.planning import ClearanceField, Problem, Settings, Vehicle, load_map, rrt
+from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map
+from dubins_rrt_ros.planning.distance import DistanceField
 from dubins_rrt_ros.planning.dubins import shortest
 from dubins_rrt_ros.planning.rrt import Search
 from dubins_rrt_ros.planning.sampling import Sampler
 from dubins_rrt_ros.share import maps_directory
 
-ARRAYS = ("poses", "parents", "costs", "words", "lengths")
+PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +22,10 @@ def maze():
 
 
 def searched(problem, **options):
-    """A finished search, with the best length after every batch."""
-    search = Search(problem, Settings(**{"seed": 1, "samples": scaled(1500), **options}),
-                    ClearanceField.of(problem.map, problem.allow_unknown))
-    lengths = []
+    """A finished search, of the plain algorithm unless the options say otherwise, with the best length after every batch."""
+    search, lengths = search_on(problem, Settings(**{"seed": 1, "samples": scaled(1500), **PLAIN, **options})), []
     while not search.done:
         search.grow()
-        search.shorten(search.done)
         lengths.append(math.inf if search.length is None else search.length)
     return search, lengths
 
@@ -36,13 +34,8 @@ def open_field(**options):
     return Problem(empty_map(), Vehicle(0.5, 0.2), (-8, -8, 0), (8, 8, 1), **options)
 
 
-def contents(search):
-    path = search.path.poses(0.1) if search.path else np.empty(0)
-    return [*(getattr(search.tree, name).tobytes() for name in ARRAYS), path.tobytes()]
-
-
 def test_rrt_ends_with_its_first_path():
-    search, lengths = searched(open_field(), planner="rrt", shortcut=False)
+    search, lengths = searched(open_field(), planner="rrt")
     assert search.samples < scaled(1500)
     assert sum(map(math.isfinite, lengths)) == 1
     assert search.length == search.tree.costs[search.best] == lengths[-1]
@@ -52,16 +45,18 @@ def test_rrt_ends_with_its_first_path():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_rrt_star_never_gets_worse_and_uses_its_budget(maze, seed):
-    search, lengths = searched(maze, seed=seed, shortcut=False)
+    search, lengths = searched(maze, seed=seed)
     assert search.samples == scaled(1500)
     assert (np.diff(np.array(lengths)[np.isfinite(lengths)]) <= 0).all()
     if SCALE == 1:
         assert lengths[-1] < next(length for length in lengths if length < math.inf)
 
 
-def test_rrt_star_finds_the_dubins_curve_on_an_open_field():
+@pytest.mark.parametrize("shortcut", [False, True])
+@pytest.mark.parametrize("informed", [False, True])
+def test_rrt_star_finds_the_dubins_curve_on_an_open_field(informed, shortcut):
     problem = open_field()
-    search, _ = searched(problem, samples=scaled(2000, least=200))
+    search, _ = searched(problem, samples=scaled(2000, least=200), informed=informed, shortcut=shortcut)
     assert search.length == pytest.approx(shortest(problem.start, problem.goal, 0.5).length, rel=1e-12)
 
 
@@ -74,62 +69,45 @@ def test_the_budget_is_met_exactly(planner, samples):
 
 
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
-@pytest.mark.parametrize("kind", ["maze", "polygons"])
-def test_a_seed_determines_every_byte(planner, kind, maze, monkeypatch):
-    problem = maze
-    if kind == "polygons":
-        map = holed_polygons(np.random.default_rng(1), count=3)
-        problem = Problem(map, Vehicle(0.4, 0.1), (0.5, 0.5, 1), (9, 9, 1))
-    once, _ = searched(problem, planner=planner)
-    again, _ = searched(problem, planner=planner)
-    assert contents(once) == contents(again)
-    for batch_time in (1e-9, 1.0):
-        monkeypatch.setattr(rrt, "BATCH_TIME", batch_time)
-        other, _ = searched(problem, planner=planner)
-        assert contents(other) == contents(once)
-        assert (other.best, other.samples) == (once.best, once.samples)
-    different, _ = searched(problem, planner=planner, seed=2)
-    assert contents(different) != contents(once)
-
-
-def test_rrt_shortens_its_one_path():
-    plain, _ = searched(open_field(), planner="rrt", shortcut=False)
-    search, lengths = searched(open_field(), planner="rrt")
-    assert contents(search)[:-1] == contents(plain)[:-1]
-    assert search.path.length == search.length == min(lengths) < plain.length
+def test_the_plain_algorithm_needs_no_distances_to_the_goal(planner, maze):
+    """What a search is given beyond field and settings changes nothing."""
+    settings = Settings(planner=planner, seed=1, samples=scaled(1500), **PLAIN)
+    without = Search(maze, settings, field_of(maze), None)
+    while not without.done:
+        without.grow()
+    assert contents(without) == contents(searched(maze, planner=planner)[0])
 
 
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
-def test_shortcuts_leave_the_tree_as_it_is(planner, maze):
-    search, _ = searched(maze, planner=planner, informed=False)
-    plain, _ = searched(maze, planner=planner, informed=False, shortcut=False)
-    assert contents(search)[:-1] == contents(plain)[:-1]
-    if plain.path:
-        assert plain.path == plain.tree.path_to(plain.best)
-        assert search.length == search.path.length <= plain.length == plain.path.length
+def test_the_best_path_of_the_plain_algorithm_is_the_tree_s(planner, maze):
+    search, _ = searched(maze, planner=planner, goal_bias=0.2)
+    if SCALE == 1:
+        assert search.best >= 0
+    if search.best >= 0:
+        assert search.path == search.tree.path_to(search.best)
+        assert search.length == search.path.length
+
+
+def test_rrt_polishes_its_one_path():
+    """Its samples, and so its path, are those of the plain algorithm until then."""
+    plain, _ = searched(open_field(), planner="rrt")
+    search, lengths = searched(open_field(), planner="rrt", shortcut=True)
+    assert search.samples == plain.samples
+    assert search.path.length == pytest.approx(search.length)
+    assert search.length == min(lengths) < plain.length
+    np.testing.assert_array_equal(search.tree.poses[:plain.size], plain.tree.poses)
 
 
 @needs_compiled
-def test_informed_samples_give_shorter_paths():
-    """About half as far above the shortest."""
-    least = shortest((-8, -8, 0), (8, 8, 1), 0.5).length
-    above = {informed: np.mean([
-        searched(open_field(), seed=seed, step_size=2.0, informed=informed, shortcut=False)[0].length - least
-        for seed in range(5)]) for informed in (True, False)}
-    assert above[True] < 0.7 * above[False]
-
-
-def test_a_smaller_budget_is_the_beginning_of_a_larger_one(maze, monkeypatch):
-    """So a plan that was cut short can be had again with the samples that it took."""
-    monkeypatch.setattr(rrt, "BATCH_TIME", 1e-9)  # batches of one sample
-    count = scaled(700)
-    part, _ = searched(maze, samples=count)
-    whole = Search(maze, Settings(samples=10 * count, seed=1), ClearanceField.of(maze.map))
-    while whole.samples < count:
-        whole.grow()
-        whole.shorten(whole.samples == count)
-    assert whole.samples == count
-    assert contents(whole) == contents(part)
+@pytest.mark.parametrize("shortcut", [False, True])
+@pytest.mark.parametrize("informed", [False, True])
+def test_what_goes_beyond_the_paper_gives_shorter_paths(informed, shortcut, maze):
+    if not (informed or shortcut):
+        return
+    plain, better = ([searched(maze, seed=seed, goal_bias=0.2, **options)[0].length or math.inf for seed in range(5)]
+                     for options in ({}, {"informed": informed, "shortcut": shortcut}))
+    assert np.mean(better) < np.mean(plain) - 0.3
+    assert max(better) < max(plain)
 
 
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
@@ -146,7 +124,8 @@ def test_without_a_step_size_edges_are_long():
 
 
 def drawn(problem, count=2000, **options):
-    return Sampler(problem, Settings(seed=1, **options), ClearanceField.of(problem.map)).draw(count)
+    field = field_of(problem)
+    return Sampler(problem, Settings(seed=1, **{**PLAIN, **options}), field, DistanceField.to_goal(problem, field)).draw(count)
 
 
 def test_samples_are_uniform():
@@ -215,7 +194,7 @@ def test_with_nothing_but_the_goal_drawn_and_a_step_the_tree_is_a_line_of_steps(
 
 def test_the_best_node_is_the_cheapest_within_the_tolerance():
     problem = open_field(goal_tolerance_xy=1.0, goal_tolerance_yaw=0.5)
-    search, _ = searched(problem, shortcut=False)
+    search, _ = searched(problem)
     tree = search.tree
     within = (np.hypot(*(tree.poses[:, :2] - (8, 8)).T) <= 1) & (np.abs(tree.poses[:, 2] - 1) <= 0.5)
     assert within[search.best]

@@ -5,3 +5,5 @@ cdef (double, double, double) drive(double x, double y, double theta, double rad
 cdef (int, double, double, double) shortest_within(double dx, double dy, double theta0, double sin0, double cos0,
                                                    double theta1, double sin1, double cos1, double radius,
                                                    double limit) noexcept nogil
+cdef (int, double, double, double) shortest(double x0, double y0, double theta0, double x1, double y1, double theta1,
+                                            double radius) noexcept nogil

@@ -10,7 +10,8 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, shortest, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.near import GainSet, NearSet
     from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
     from cython.cimports.libc.math import ceil, fabs, log, remainder
@@ -18,13 +19,17 @@ else:
     from math import ceil, fabs, log, remainder
 
     from .clearance import Clearance
-    from .dubins import TWO_PI, drive, turn_of
+    from .dubins import TWO_PI, drive, shortest, turn_of
+    from .field import CostField
     from .near import GainSet, NearSet
     from .tree import SearchTree
 
 #: A smaller gain is rounding, and no reason to rewire [m].
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
 NO_WAY = cython.declare(cython.double, 1e300)
+#: Where there is a limit to beat, one sample of so many is taken through RRT* in full, which is enough for asymptotic optimality.
+#: The others look for parents that are of use and no farther away than the nearest often are, which is much faster.
+SAMPLES_PER_FULL = cython.declare(cython.int, 16)
 #: By how much the sum of a step's arcs may exceed it, relatively.
 ROUNDING = cython.declare(cython.double, 1e-9)
 
@@ -51,6 +56,11 @@ class Grower:
     closest: NearSet
     to: NearSet
     onward: GainSet
+    bounded: cython.bint
+    tried: cython.int
+    limit: cython.double
+    from_start: CostField
+    to_goal: CostField
     goal_nodes: cython.int[::1]
     goal_count = cython.declare(cython.int, visibility="readonly")
 
@@ -74,6 +84,35 @@ class Grower:
         self.onward = GainSet(tree, most_near)
         self.goal_nodes = np.empty(0, np.int32)
         self.goal_count = 0
+        self.bounded = False
+        self.tried = 0
+        self.limit = NO_WAY
+
+    def beat(self, limit: cython.double, from_start: CostField, to_goal: CostField):
+        """From now on add and attach only what can be on a path shorter than `limit` [m], by distances that none falls below."""
+        self.bounded = True
+        self.limit, self.from_start, self.to_goal = limit, from_start, to_goal
+
+    def adopt(self, poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], end: cython.int):
+        """Add a path from the root, and rewire the nodes near it.
+
+        Args:
+            poses, words, lengths: of the path, the root's first.
+            end: the node at the end of the path, or -1 where it has none yet.
+        """
+        last: cython.int = cython.cast(cython.int, poses.shape[0]) - 1
+        node: cython.int = 0
+        i: cython.int
+        self.reserve(last)
+        with cython.nogil:
+            for i in range(1, last + 1):
+                if i < last or end < 0:
+                    node = self.add(poses[i, 0], poses[i, 1], poses[i, 2], node, words[i],
+                                    lengths[i, 0], lengths[i, 1], lengths[i, 2])
+                    self.to.collect_nearest(poses[i, 0], poses[i, 1], poses[i, 2], self.near_count(), self.longest)
+                    self.rewire(node, self.to.reach)
+                elif self.tree.costs[node] + (lengths[i, 0] + lengths[i, 1] + lengths[i, 2]) < self.tree.costs[end]:
+                    self.tree.reparent(end, node, words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
 
     def reserve(self, more: cython.int):
         """Make room for `more` nodes, so that adding them allocates nothing."""
@@ -143,8 +182,16 @@ class Grower:
                 return
         if not self.clearance.free(x, y, self.need):
             return
-        near: cython.int = cython.cast(cython.int, ceil(self.near_factor * log(self.tree.size + 1)))
-        self.to.collect_nearest(x, y, theta, near, self.longest)
+        limit: cython.double = self.limit
+        if self.bounded:
+            limit -= self.cost_to_go(x, y, theta)
+            if self.cost_to_come(x, y, theta) >= limit:
+                return
+        self.tried += 1
+        if self.bounded and self.tried % SAMPLES_PER_FULL != 0:
+            self.to.collect_useful(x, y, theta, self.near_count(), limit, self.longest)
+        else:
+            self.to.collect_nearest(x, y, theta, self.near_count(), self.longest)
         if self.step > 0 and (self.to.count == 0 or self.to.keys[self.to.count - 1] > first + second + third):
             # The edge as it was steered: solved anew, rounding of the pose can make it longer by a full circle.
             self.to.insert(self.closest.nodes[0], word, first, second, third)
@@ -157,9 +204,44 @@ class Grower:
             self.choose_parent(x, y, theta, node, self.tree.costs[node] - LEAST_GAIN)
             return
         reach: cython.double = self.to.reach
-        node = self.choose_parent(x, y, theta, -1, NO_WAY)
+        node = self.choose_parent(x, y, theta, -1, limit)
         if node >= 0:
             self.rewire(node, reach)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def near_count(self) -> cython.int:
+        """How many nodes are near."""
+        return cython.cast(cython.int, ceil(self.near_factor * log(self.tree.indexed + 1)))
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def cost_to_go(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.double:
+        """A length that no path from a pose to the goal falls below."""
+        around: cython.double = self.to_goal.at(x, y)
+        if around >= self.limit or self.tolerance_xy > 0 or self.tolerance_yaw > 0:
+            return around
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        word, first, second, third = shortest(x, y, theta, self.goal_x, self.goal_y, self.goal_theta, self.tree.radius)
+        return max(around, first + second + third)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def cost_to_come(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.double:
+        """A length that no path from the start to a pose falls below."""
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        word, first, second, third = shortest(self.tree.poses[0, 0], self.tree.poses[0, 1], self.tree.poses[0, 2], x, y, theta,
+                                              self.tree.radius)
+        return max(self.from_start.at(x, y), first + second + third)
 
     @cython.cfunc
     @cython.nogil

@@ -6,6 +6,8 @@ cdef class NearSet:
     cdef int wanted
     cdef double reach
     cdef double guess
+    cdef double usual
+    cdef double most_cost
     cdef double x
     cdef double y
     cdef double theta
@@ -18,9 +20,12 @@ cdef class NearSet:
     cdef void begin(self, double x, double y, double theta, double reach) noexcept nogil
     cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
     cdef void consider(self, int node, double dx, double dy, double bound) noexcept nogil
-    cdef void consider_bucket(self, int row, int column) noexcept nogil
+    cdef void consider_place(self, int row, int column) noexcept nogil
+    cdef void consider_bucket(self, int node) noexcept nogil
     cdef void consider_all(self) noexcept nogil
     cdef void collect_nearest(self, double x, double y, double theta, int wanted, double within) noexcept nogil
+    cdef void collect_useful(self, double x, double y, double theta, int wanted, double most_cost,
+                             double within) noexcept nogil
 
 cdef class GainSet(NearSet):
     cdef double cost

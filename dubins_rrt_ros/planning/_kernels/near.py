@@ -22,6 +22,11 @@ else:
 
 #: The next near set is guessed to reach this much farther than the last.
 GUESS = cython.declare(cython.double, 1.25)
+#: By what factors it is adapted how far the nearest often are: so one in five of the near sets reaches no farther.
+RISE = cython.declare(cython.double, 1.1 ** 0.2)
+FALL = cython.declare(cython.double, 1.1 ** 0.8)
+#: No bound of the cost.
+UNLIMITED = cython.declare(cython.double, 1e300)
 #: The least guess, in turning radii: it grows by doubling, which must not begin at 0.
 LEAST_GUESS = cython.declare(cython.double, 1e-3)
 
@@ -37,7 +42,7 @@ class NearSet:
     def __init__(self, tree: SearchTree, capacity: cython.int):
         self.tree = tree
         self.count = 0
-        self.guess = tree.radius
+        self.guess = self.usual = tree.radius
         self.keys = np.empty(capacity)
         self.nodes = np.empty(capacity, np.int32)
         self.words = np.empty(capacity, np.int8)
@@ -52,7 +57,7 @@ class NearSet:
 
         A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
         """
-        self.wanted = min(min(wanted, self.tree.size), cython.cast(cython.int, self.keys.shape[0]))
+        self.wanted = min(min(wanted, self.tree.indexed), cython.cast(cython.int, self.keys.shape[0]))
         self.begin(x, y, theta, min(self.guess, within))
         self.consider_all()
         while self.count < self.wanted and self.guess < within:
@@ -60,6 +65,22 @@ class NearSet:
             self.begin(x, y, theta, min(self.guess, within))
             self.consider_all()
         self.guess = max(GUESS * self.reach, LEAST_GUESS * self.tree.radius)
+        self.usual = self.usual * RISE if self.reach > self.usual else self.usual / FALL
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def collect_useful(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int,
+                       most_cost: cython.double, within: cython.double) -> cython.void:
+        """Find the `wanted` nodes with the shortest curves to a pose by which it costs less than `most_cost`, of those no farther
+        than the nearest often are.
+
+        Most nodes are too expensive already by the straight line, so that few curves are computed.
+        """
+        self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
+        self.begin(x, y, theta, min(self.usual, within))
+        self.most_cost = most_cost
+        self.consider_all()
 
     @cython.cfunc
     @cython.nogil
@@ -68,6 +89,7 @@ class NearSet:
         """Empty the set and set the pose that it is about."""
         self.count = 0
         self.reach = reach
+        self.most_cost = UNLIMITED
         self.x, self.y, self.theta = x, y, theta
         self.sin_theta, self.cos_theta = sin(theta), cos(theta)
 
@@ -103,25 +125,50 @@ class NearSet:
     @cython.exceptval(check=False)
     def consider(self, node: cython.int, dx: cython.double, dy: cython.double, bound: cython.double) -> cython.void:
         """Take a node, which lies (dx, dy) from the pose, if its curve to the pose, at least `bound` long, is short enough."""
+        limit: cython.double = self.reach
+        if self.most_cost < UNLIMITED:
+            limit = min(limit, self.most_cost - self.tree.costs[node])
+            if bound >= limit:
+                return
         word: cython.int
         first: cython.double
         second: cython.double
         third: cython.double
         word, first, second, third = shortest_within(
             -dx, -dy, self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1],
-            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.reach)
+            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, limit)
         if first < NO_CURVE:
             self.insert(node, word, first, second, third)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def consider_bucket(self, row: cython.int, column: cython.int) -> cython.void:
-        """Consider the nodes of a bucket that the lower bound does not rule out."""
+    def consider_place(self, row: cython.int, column: cython.int) -> cython.void:
+        """Consider the buckets of a place with headings that are within reach."""
+        sectors: cython.int = cython.cast(cython.int, self.tree.buckets.shape[2])
+        if sectors == 1:
+            self.consider_bucket(self.tree.buckets[row, column, 0])
+            return
+        turn: cython.double = self.reach / self.tree.radius
+        sector: cython.int = 0
+        count: cython.int = sectors
+        if turn < TWO_PI / 2:
+            sector = self.tree.sector_of(self.theta - turn)
+            count = min(sectors, 1 + (self.tree.sector_of(self.theta + turn) - sector + sectors) % sectors)
+            if count == 1 and turn > TWO_PI / sectors:
+                count = sectors
+        i: cython.int
+        for i in range(count):
+            self.consider_bucket(self.tree.buckets[row, column, (sector + i) % sectors])
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def consider_bucket(self, node: cython.int) -> cython.void:
+        """Consider the nodes of a bucket, from its first on, that the lower bound does not rule out."""
         dx: cython.double
         dy: cython.double
         bound: cython.double
-        node: cython.int = self.tree.buckets[row, column]
         while node >= 0:
             dx = self.tree.poses[node, 0] - self.x
             dy = self.tree.poses[node, 1] - self.y
@@ -154,12 +201,12 @@ class NearSet:
             for i in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
                 if i == row - ring or i == row + ring:
                     for j in range(max(column - ring, 0), min(column + ring, columns - 1) + 1):
-                        self.consider_bucket(i, j)
+                        self.consider_place(i, j)
                 else:
                     if column - ring >= 0:
-                        self.consider_bucket(i, column - ring)
+                        self.consider_place(i, column - ring)
                     if column + ring < columns:
-                        self.consider_bucket(i, column + ring)
+                        self.consider_place(i, column + ring)
 
 
 @cython.cclass

@@ -5,13 +5,18 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.libc.math import cos, sin, sqrt
+    from cython.cimports.libc.math import cos, floor, sin, sqrt
 else:
-    from math import cos, sin, sqrt
+    from math import cos, floor, sin, sqrt
 
 
-#: About how many buckets there are. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
+#: About how many buckets there are at first. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
 BUCKETS = 1024
+#: There are made more of them where there are more than so many nodes for each, up to a largest number of them.
+MOST_PER_BUCKET, MOST_BUCKETS = 2, 1 << 22
+#: Into how many sectors headings are then divided, each with buckets of its own.
+SECTORS = 16
+TWO_PI = cython.declare(cython.double, 6.283185307179586476925286766559)
 
 
 @cython.cclass
@@ -20,6 +25,7 @@ class SearchTree:
 
     Attributes:
         size: how many nodes there are; node 0 is the root. The arrays are longer.
+        indexed: how many of them are found as neighbours.
         radius: the turning radius of all edges [m].
         poses: (n, 3): x [m], y [m], theta [rad].
         headings: (n, 2): sine and cosine of theta.
@@ -37,11 +43,9 @@ class SearchTree:
         """
         self.radius = radius
         self.x0, self.y0 = corner
-        width, height = extent
-        self.bucket_size = sqrt(width * height / BUCKETS)
-        shape = (int(height / self.bucket_size) + 1, int(width / self.bucket_size) + 1)
-        self.buckets = np.full(shape, -1, dtype=np.int32)
-        self.size = 0
+        self.x_extent, self.y_extent = extent
+        self.make_buckets(BUCKETS, 1)
+        self.size = self.indexed = 0
         self.poses = np.empty((0, 3))
         self.headings = np.empty((0, 2))
         self.parents = self.first_child = self.next_sibling = self.previous_sibling = self.next_in_bucket = np.empty(0, np.int32)
@@ -86,6 +90,15 @@ class SearchTree:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
+    def sector_of(self, theta: cython.double) -> cython.int:
+        """The sector of the buckets that holds a heading, of any number of turns."""
+        sectors: cython.int = cython.cast(cython.int, self.buckets.shape[2])
+        turns: cython.double = theta / TWO_PI
+        return min(cython.cast(cython.int, (turns - floor(turns)) * sectors), sectors - 1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
     def attach(self, node: cython.int, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
                third: cython.double) -> cython.void:
         """Make `node`, which has no parent, a child of `parent`."""
@@ -122,11 +135,51 @@ class SearchTree:
             self.lengths[node, 0] = self.lengths[node, 1] = self.lengths[node, 2] = 0
         else:
             self.attach(node, parent, word, first, second, third)
-        row: cython.int = self.bucket_row(y)
-        column: cython.int = self.bucket_column(x)
-        self.next_in_bucket[node] = self.buckets[row, column]
-        self.buckets[row, column] = node
+        self.index(node)
         return node
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def index(self, node: cython.int) -> cython.void:
+        """Put a node into its bucket."""
+        row: cython.int = self.bucket_row(self.poses[node, 1])
+        column: cython.int = self.bucket_column(self.poses[node, 0])
+        sector: cython.int = self.sector_of(self.poses[node, 2])
+        self.next_in_bucket[node] = self.buckets[row, column, sector]
+        self.buckets[row, column, sector] = node
+        self.indexed += 1
+
+    def index_only(self, wanted: cython.schar[::1]):
+        """Let only those of the (size,) nodes that are not 0 be found as neighbours from now on."""
+        node: cython.int
+        self.buckets[:, :, :] = -1
+        self.indexed = 0
+        with cython.nogil:
+            for node in range(self.size):
+                if wanted[node]:
+                    self.index(node)
+
+    def spread(self):
+        """Make more buckets, if there are many nodes for each. To be called at moments that depend on the samples alone."""
+        count: cython.int = self.buckets.shape[0] * self.buckets.shape[1] * self.buckets.shape[2]
+        if self.indexed <= MOST_PER_BUCKET * count or count >= MOST_BUCKETS:
+            return
+        wanted = np.zeros(self.size, np.int8)
+        buckets, following = np.asarray(self.buckets), np.asarray(self.next_in_bucket)
+        nodes = buckets[buckets >= 0]
+        while len(nodes):
+            wanted[nodes] = 1
+            nodes = following[nodes]
+            nodes = nodes[nodes >= 0]
+        self.make_buckets(16 * self.indexed, SECTORS)
+        self.index_only(wanted)
+
+    def make_buckets(self, count, sectors):
+        """Make about `count` buckets, all empty."""
+        self.bucket_size = sqrt(self.x_extent * self.y_extent * sectors / count)
+        shape = (int(self.y_extent / self.bucket_size) + 1, int(self.x_extent / self.bucket_size) + 1, sectors)
+        self.buckets = np.full(shape, -1, dtype=np.int32)
 
     @cython.cfunc
     @cython.nogil

@@ -10,8 +10,10 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
 else:
     from .clearance import Clearance
+    from .heap import Heap
 
 #: What is known of a node: how it was entered (from the left, the right, below, above, or as the start), or nothing.
 UNSEEN = cython.declare(cython.schar, 0)
@@ -39,9 +41,7 @@ class Flood:
     entered: cython.schar[::1]
     queue: cython.int[::1]
     queued: cython.int
-    heap: cython.int[::1]
-    keys: cython.double[::1]
-    heaped: cython.int
+    heap: Heap
 
     def __init__(self, clearance: Clearance, first, along, shape, is_target, least, enough):
         """
@@ -60,8 +60,8 @@ class Flood:
         self.is_target = is_target
         nodes = self.rows * self.columns
         self.entered = np.zeros(nodes, np.int8)
-        self.queue, self.heap, self.keys = np.empty(nodes, np.int32), np.empty(nodes, np.int32), np.empty(nodes)
-        self.queued = self.heaped = 0
+        self.queue, self.heap = np.empty(nodes, np.int32), Heap(nodes)
+        self.queued = 0
 
     def widest_way(self, start: cython.int):
         """The least clearance on the widest way [m], at most `enough`, and the way's nodes as (n,) int32; 0 and none
@@ -81,13 +81,13 @@ class Flood:
         column: cython.int
         served: cython.int = 0
         self.enter(start, START)
-        while served < self.queued or self.heaped > 0:
+        while served < self.queued or self.heap.count > 0:
             if served < self.queued:
                 node = self.queue[served]
                 served += 1
             else:
-                self.level = self.keys[0]
-                node = self.pop()
+                self.level = -self.heap.least_key()
+                node = self.heap.pop()
             if self.is_target[node]:
                 return node
             row, column = node // self.columns, node % self.columns
@@ -120,40 +120,7 @@ class Flood:
             self.queue[self.queued] = node
             self.queued += 1
         else:
-            self.push(node, found)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def push(self, node: cython.int, key: cython.double) -> cython.void:
-        """Add a node to the heap, which has the largest key on top."""
-        i: cython.int = self.heaped
-        self.heaped += 1
-        while i > 0 and self.keys[(i - 1) // 2] < key:
-            self.heap[i], self.keys[i] = self.heap[(i - 1) // 2], self.keys[(i - 1) // 2]
-            i = (i - 1) // 2
-        self.heap[i], self.keys[i] = node, key
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def pop(self) -> cython.int:
-        """Take the node with the largest key from the heap."""
-        top: cython.int = self.heap[0]
-        self.heaped -= 1
-        last: cython.int = self.heap[self.heaped]
-        key: cython.double = self.keys[self.heaped]
-        i: cython.int = 0
-        child: cython.int = 1
-        while child < self.heaped:
-            if child + 1 < self.heaped and self.keys[child + 1] > self.keys[child]:
-                child += 1
-            if self.keys[child] <= key:
-                break
-            self.heap[i], self.keys[i] = self.heap[child], self.keys[child]
-            i, child = child, 2 * child + 1
-        self.heap[i], self.keys[i] = last, key
-        return top
+            self.heap.push(node, -found)
 
     def way_to(self, node: cython.int):
         """(n,) int32: the nodes by which `node` was reached, from the start on."""

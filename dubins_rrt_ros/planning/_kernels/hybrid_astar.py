@@ -1,0 +1,235 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""Hybrid A*: a search over short arcs that keeps one pose per cell of a lattice of positions and headings.
+
+D. Dolgov, S. Thrun, M. Montemerlo and J. Diebel, Practical search techniques in path planning for autonomous driving (2008).
+The next pose is the one whose cost and weighted cost-to-go together are least; the cost-to-go is the longer one of the way around
+the obstacles and of the Dubins curve without them. From each pose the Dubins curve to the goal is tried.
+"""
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, shortest_within
+    from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
+    from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
+    from cython.cimports.libc.math import cos, remainder, sin
+else:
+    from math import cos, remainder, sin
+
+    from .clearance import Clearance
+    from .dubins import NO_CURVE, TWO_PI, drive, shortest_within
+    from .field import CostField
+    from .heap import Heap
+
+#: What `best_cost` holds of a cell whose pose was expanded, and of one without a pose.
+EXPANDED = cython.declare(cython.float, -1)
+UNSEEN = cython.declare(cython.float, 0)
+#: No more cells are told apart, so that large maps need no more memory: a prime, so that those taken as one lie far apart.
+MOST_CELLS = 4_194_301
+
+
+@cython.cclass
+class HybridAStar:
+    """A search under way.
+
+    Attributes:
+        size: how many poses were reached; expanded: how many of them were expanded.
+        ended: whether a path was found, or nothing is left to expand.
+    """
+
+    clearance: Clearance
+    need: cython.double
+    radius: cython.double
+    to_goal: CostField
+    goals: cython.double[:, ::1]
+    x0: cython.double
+    y0: cython.double
+    arc: cython.double
+    cell: cython.double
+    sectors: cython.int
+    columns: cython.longlong
+    rows: cython.longlong
+    weight: cython.double
+    limit: cython.double
+    size = cython.declare(cython.int, visibility="readonly")
+    expanded = cython.declare(cython.int, visibility="readonly")
+    ended = cython.declare(cython.bint, visibility="readonly")
+    poses: cython.double[:, ::1]
+    costs: cython.double[::1]
+    parents: cython.int[::1]
+    turns: cython.schar[::1]
+    best_cost: cython.float[::1]
+    open: Heap
+    last: cython.int
+    last_goal: cython.int
+    last_word: cython.int
+    last_lengths: cython.double[::1]
+
+    def __init__(self, clearance: Clearance, need, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight,
+                 limit, most):
+        """
+        Args:
+            need: the clearance that all arcs keep [m].
+            start: (x, y, theta); goals: (m, 3) poses any of which will do.
+            to_goal: the distances to the goal.
+            corner, extent: lowest (x, y) of the map, and its size [m].
+            arc: the length of an arc [m]; the lattice has cells of about 0.7 of that, and `sectors` headings.
+            weight: of the cost-to-go: 1 seeks the shortest path, more a quick one.
+            limit: paths that are not shorter are not sought [m].
+            most: no more poses are expanded.
+        """
+        self.clearance, self.need, self.radius = clearance, need, radius
+        self.to_goal, self.goals = to_goal, goals
+        self.x0, self.y0 = corner
+        self.arc, self.cell, self.sectors, self.weight, self.limit = arc, 0.7 * arc, sectors, weight, limit
+        self.columns, self.rows = int(extent[0] / self.cell) + 1, int(extent[1] / self.cell) + 1
+        self.best_cost = np.zeros(min(int(self.columns) * int(self.rows) * sectors, MOST_CELLS), np.float32)
+        room = 3 * most + 1
+        self.poses, self.costs = np.empty((room, 3)), np.empty(room)
+        self.parents, self.turns = np.empty(room, np.int32), np.empty(room, np.int8)
+        self.open = Heap(room)
+        self.last_lengths = np.zeros(3)
+        self.last = -1
+        self.size = self.expanded = 0
+        self.ended = False
+        self.add(start[0], start[1], start[2], 0, -1, 0, 0)
+
+    def run(self, expansions: cython.int):
+        """Expand up to so many poses more, fewer where the search ends."""
+        _: cython.int
+        with cython.nogil:
+            for _ in range(min(expansions, self.parents.shape[0] // 3 - self.expanded)):
+                if self.open.count == 0 or self.last >= 0:
+                    break
+                self.expand(self.open.pop())
+        self.ended = self.last >= 0 or self.open.count == 0 or self.expanded == self.parents.shape[0] // 3
+
+    def path(self):
+        """The path that was found: (n, 3) poses from the start on, and (n,) words and (n, 3) lengths [m] of the curves to them
+        from those before, the first of which mean nothing; None where there is none."""
+        if self.last < 0:
+            return None
+        nodes = [self.last]
+        while self.parents[nodes[0]] >= 0:
+            nodes.insert(0, self.parents[nodes[0]])
+        poses = np.concatenate([np.asarray(self.poses)[nodes], np.asarray(self.goals)[self.last_goal:self.last_goal + 1]])
+        turns = np.asarray(self.turns)[nodes]
+        words = np.append(np.where(turns < 0, 1, 0), self.last_word).astype(np.int8)
+        lengths = np.where(np.column_stack([turns != 0, turns == 0, np.zeros(len(nodes), bool)]), self.arc, 0.0)
+        lengths[:1] = 0
+        return poses, words, np.concatenate([lengths, [self.last_lengths]])
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def expand(self, node: cython.int) -> cython.void:
+        """Try the curve to the goal, then the three arcs from a pose, unless a better one of its cell was expanded before."""
+        cell: cython.int = self.cell_of(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
+        if self.best_cost[cell] == EXPANDED:
+            return
+        self.best_cost[cell] = EXPANDED
+        self.expanded += 1
+        if self.reaches_goal(node):
+            self.last = node
+            return
+        self.extend(node, 0)
+        self.extend(node, 1)
+        self.extend(node, -1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def reaches_goal(self, node: cython.int) -> cython.bint:
+        """Whether a free curve leads to the goal that is nearest by its curve; if so, it is noted."""
+        goal: cython.int
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        limit: cython.double = self.limit - self.costs[node]
+        self.last_goal = -1
+        for goal in range(self.goals.shape[0]):
+            word, first, second, third = self.curve_to_goal(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2],
+                                                            goal, limit)
+            if first < NO_CURVE:
+                limit = first + second + third
+                self.last_goal, self.last_word = goal, word
+                self.last_lengths[0], self.last_lengths[1], self.last_lengths[2] = first, second, third
+        return self.last_goal >= 0 and self.clearance.curve_is_free(
+            self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius, self.last_word,
+            self.last_lengths[0], self.last_lengths[1], self.last_lengths[2], self.need)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def extend(self, node: cython.int, turn: cython.int) -> cython.void:
+        """Drive an arc from a pose; keep where it ends if that can still lead to the goal and is the best of its cell so far."""
+        x: cython.double
+        y: cython.double
+        theta: cython.double
+        x, y, theta = drive(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius, turn, self.arc)
+        theta = remainder(theta, TWO_PI)
+        if not self.clearance.free(x, y, self.need):
+            return
+        cost: cython.double = self.costs[node] + self.arc
+        cell: cython.int = self.cell_of(x, y, theta)
+        seen: cython.float = self.best_cost[cell]
+        if seen != UNSEEN and seen <= cost * (1 + 1e-6):
+            return
+        more: cython.double = self.cost_to_go(x, y, theta, self.limit - cost)
+        if cost + more >= self.limit:
+            return
+        if not self.clearance.curve_is_free(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius,
+                                            1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0,
+                                            self.need):
+            return
+        self.best_cost[cell] = cython.cast(cython.float, cost)
+        self.add(x, y, theta, cost, node, turn, cost + self.weight * more)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def cost_to_go(self, x: cython.double, y: cython.double, theta: cython.double, limit: cython.double) -> cython.double:
+        """A length that no path to the goal falls below, if less than `limit`."""
+        around: cython.double = self.to_goal.at(x, y)
+        if around >= limit or self.goals.shape[0] > 1:
+            return around
+        word: cython.int
+        first: cython.double
+        second: cython.double
+        third: cython.double
+        word, first, second, third = self.curve_to_goal(x, y, theta, 0, limit)
+        return max(around, first + second + third)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def curve_to_goal(self, x: cython.double, y: cython.double, theta: cython.double, goal: cython.int, limit: cython.double
+                      ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
+        """The shortest curve to one of the goals, or none shorter than `limit`."""
+        return shortest_within(self.goals[goal, 0] - x, self.goals[goal, 1] - y, theta, sin(theta), cos(theta),
+                               self.goals[goal, 2], sin(self.goals[goal, 2]), cos(self.goals[goal, 2]), self.radius, limit)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def add(self, x: cython.double, y: cython.double, theta: cython.double, cost: cython.double, parent: cython.int,
+            turn: cython.int, key: cython.double) -> cython.void:
+        """Note a pose that was reached, to be expanded."""
+        node: cython.int = self.size
+        self.size += 1
+        self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = x, y, theta
+        self.costs[node], self.parents[node], self.turns[node] = cost, parent, turn
+        self.open.push(node, key)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def cell_of(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.int:
+        """The cell of the lattice that holds a pose of the map."""
+        column: cython.ulonglong = min(cython.cast(cython.longlong, max(x - self.x0, 0.0) / self.cell), self.columns - 1)
+        row: cython.ulonglong = min(cython.cast(cython.longlong, max(y - self.y0, 0.0) / self.cell), self.rows - 1)
+        sector: cython.int = cython.cast(cython.int, (remainder(theta, TWO_PI) / TWO_PI + 1) * self.sectors) % self.sectors
+        return cython.cast(cython.int, ((row * self.columns + column) * self.sectors + sector) % self.best_cost.shape[0])

@@ -1,0 +1,246 @@
+"""Hybrid A*: what it finds is free, continuous, within its limit and at the goal; the heap that it is built on."""
+
+import heapq
+import math
+
+import naive
+import numpy as np
+import pytest
+from cases import SCALE, empty_map, field_of, interpreted, needs_compiled, path_of, random_maps, random_problem, scaled
+
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit, load_map
+from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar
+from dubins_rrt_ros.planning.chain import Chain
+from dubins_rrt_ros.planning.distance import DistanceField
+from dubins_rrt_ros.planning.dubins import WORDS, shortest
+from dubins_rrt_ros.planning.hybrid_astar import FIRST_RUNS, HybridAStarRuns
+from dubins_rrt_ros.share import maps_directory
+
+VEHICLE = Vehicle(0.5, 0.2)
+START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
+
+
+def runs_on(problem, **options):
+    field = field_of(problem)
+    return HybridAStarRuns(problem, Settings(seed=1, **options), field, DistanceField.to_goal(problem, field))
+
+
+def first_path(problem, portion=256):
+    """The first path, or None, and the runs."""
+    runs, expanded = runs_on(problem), 0
+    while not runs.exhausted and expanded < scaled(100_000, least=10_000):
+        if found := runs.run(portion, None):
+            return found, runs
+        expanded += portion
+    return None, runs
+
+
+def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=20_000):
+    """One run."""
+    field, corners = field_of(problem), problem.map.corners()
+    radius = problem.vehicle.turning_radius
+    return HybridAStar(field.kernel, problem.vehicle.robot_radius, radius, problem.start, np.array([problem.goal]),
+                       DistanceField.to_goal(problem, field).kernel, corners.min(axis=0), np.ptp(corners, axis=0),
+                       arc * radius, sectors, weight, limit, most)
+
+
+def finished(search, portion=1000):
+    while not search.ended:
+        search.run(portion)
+    return search.path() and Chain(*search.path())
+
+
+def walled():
+    data = np.zeros((40, 40))
+    data[:30, 20] = data[32:, 20] = 100
+    return Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), VEHICLE, START, (8.0, -8.0, 2.0))
+
+
+def check(chain, problem):
+    """Each curve keeps the clearance and ends where the next begins, but for the first as it was asked for."""
+    path = path_of(chain, problem.vehicle.turning_radius)
+    assert path.start == problem.start
+    at = np.array(problem.start)
+    for i, curve in enumerate(path.curves, start=1):
+        assert min(curve.lengths) >= 0
+        assert field_of(problem).curve_is_free(curve, problem.vehicle.robot_radius)
+        end = naive.drive(at, curve.word, curve.lengths, curve.radius)
+        np.testing.assert_allclose(end[:2], chain.poses[i, :2], atol=1e-8)
+        assert abs(math.remainder(end[2] - chain.poses[i, 2], math.tau)) <= 1e-9
+        at = chain.poses[i]
+    assert math.dist(path.end[:2], problem.goal[:2]) <= problem.goal_tolerance_xy
+    assert abs(math.remainder(path.end[2] - problem.goal[2], math.tau)) <= problem.yaw_tolerance + 1e-9
+    assert audit(path, problem).ok
+
+
+@needs_compiled
+def test_paths_on_random_problems_are_free_and_lead_to_the_goal():
+    """Of every kind of map, vehicle and tolerance; those that are found at all."""
+    rng = np.random.default_rng(1)
+    found = tried = 0
+    for seed in range(60):
+        problem, clearance = random_problem(rng, random_maps(30)[seed % 30])
+        ends = clearance(np.array([problem.start[:2], problem.goal[:2]]))
+        if ends.min() < problem.vehicle.robot_radius or not naive.are_connected(problem, problem.vehicle.robot_radius):
+            continue
+        tried += 1
+        chain, _ = first_path(problem)
+        if chain is not None:
+            check(chain, problem)
+            least = 0 if problem.goal_tolerance_xy > 0 else math.dist(problem.start[:2], problem.goal[:2])
+            assert chain.length >= least - 1e-9
+            found += 1
+    assert found > tried / 2 > 1
+
+
+def test_in_the_open_the_first_path_is_the_dubins_curve():
+    problem = Problem(empty_map(), VEHICLE, START, GOAL)
+    chain, _ = first_path(problem, portion=1)
+    curve = shortest(START, GOAL, 0.5)
+    assert len(chain.words) == 2
+    assert (WORDS[chain.words[1]], tuple(chain.lengths[1])) == (curve.word, curve.lengths)
+
+
+@pytest.mark.parametrize("portion", [1, 7, 256, 100_000])
+def test_portions_do_not_change_the_path(portion):
+    whole = first_path(walled(), portion=1000)[0]
+    chain = first_path(walled(), portion=portion)[0]
+    assert [array.tobytes() for array in chain] == [array.tobytes() for array in whole]
+    assert len(chain.words) > 10
+
+
+@needs_compiled
+def test_portions_do_not_change_later_paths():
+    def later(portion):
+        runs, best, found = runs_on(walled()), None, []
+        for _ in range(60_000 // portion):
+            if (chain := runs.run(portion, best)) is not None:
+                found.append(chain)
+                best = chain.length if best is None else best
+        return [chain.poses.tobytes() for chain in found]
+
+    few, many = later(50), later(5)
+    assert few[:len(many)] == many[:len(few)]
+    assert min(len(few), len(many)) >= 2
+
+
+@pytest.mark.parametrize("weight", [1.0, 1.5])
+def test_no_path_is_as_long_as_the_limit(weight):
+    free = finished(search_on(walled(), weight=weight))
+    check(free, walled())
+    same = finished(search_on(walled(), weight=weight, limit=free.length + 1e-6))
+    assert same.length == pytest.approx(free.length)
+    for limit in (free.length, 0.95 * free.length, 0.9 * free.length):
+        chain = finished(search_on(walled(), weight=weight, limit=limit))
+        assert chain is None or chain.length < limit
+    assert finished(search_on(walled(), weight=weight, limit=20.0)) is None  # the way around is longer
+
+
+def test_the_limit_saves_expansions():
+    free, limited = search_on(walled(), weight=1.0), search_on(walled(), weight=1.0, limit=25.0)
+    finished(free)
+    finished(limited)
+    assert limited.expanded < free.expanded
+
+
+@pytest.mark.parametrize("tolerance", [
+    {"any_goal_heading": True}, {"goal_tolerance_yaw": 0.7}, {"goal_tolerance_xy": 1.0, "any_goal_heading": True},
+    {"goal_tolerance_xy": 1.0}])
+def test_goals_with_tolerances(tolerance):
+    """Of the headings that are allowed, one with a path is taken that is about as short as to the goal itself."""
+    problem = walled()
+    exact = first_path(problem)[0]
+    loose = Problem(problem.map, VEHICLE, problem.start, problem.goal, **tolerance)
+    chain = first_path(loose)[0]
+    check(chain, loose)
+    assert chain.length <= 1.02 * exact.length
+    if loose.yaw_tolerance == 0:
+        assert tuple(chain.poses[-1]) == problem.goal
+
+
+@pytest.mark.parametrize("goal", [(8.0, -8.0, 40.0), (8.0, -8.0, -1000.0)])
+def test_headings_many_turns_beyond_pi(goal):
+    problem = walled()
+    turned = Problem(problem.map, VEHICLE, (*START[:2], -250.0), goal)
+    chain = first_path(turned)[0]
+    check(chain, turned)
+    assert tuple(chain.poses[-1]) == goal
+    near = Problem(problem.map, VEHICLE, (*START[:2], math.remainder(-250.0, math.tau)),
+                   (*goal[:2], math.remainder(goal[2], math.tau)))
+    assert first_path(near)[0].length == pytest.approx(chain.length, abs=1e-6)
+
+
+def test_an_unreachable_goal_ends_the_runs():
+    """Nothing is found behind a wall, by any of the first runs; the last of them ends the search."""
+    data = np.zeros((20, 20))
+    data[:, 13] = 100
+    closed = Problem(GridMap(data, 0.25), VEHICLE, (2.5, 2.5, 0.0), (4.5, 2.5, 0.0))
+    chain, runs = first_path(closed, portion=500)
+    assert chain is None
+    assert runs.exhausted
+
+
+def test_a_run_gives_up_after_so_many_poses():
+    problem = Problem(load_map(maps_directory() / "maze.yaml"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
+    search = search_on(problem, most=20)
+    assert finished(search) is None
+    assert (search.expanded, search.ended) == (20, True)
+
+
+def test_each_first_run_solves_the_maze():
+    problem = Problem(load_map(maps_directory() / "maze.yaml"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
+    for arc, sectors in FIRST_RUNS[:3 if SCALE == 1 else 1]:
+        chain = finished(search_on(problem, arc=arc, sectors=sectors))
+        check(chain, problem)
+        assert chain.length < 28
+
+
+@pytest.mark.parametrize("side, radius", [(400.0, 0.1), (1000.0, 0.02), (1e6, 0.001)])
+def test_a_lattice_of_more_cells_than_memory(side, radius):
+    """A vehicle that turns nearly on the spot, on a large map: its lattice has up to 10^21 cells."""
+    data = np.zeros((40, 40))
+    data[:30, 20] = 100
+    vehicle = Vehicle(radius, 0.2)
+    problem = Problem(GridMap(data, side / 40), vehicle, (0.3 * side, 0.9 * side, 0.0), (0.7 * side, 0.9 * side, 1.0))
+    chain, _ = first_path(problem)
+    assert chain.length == pytest.approx(0.4 * side, abs=10 * radius)
+    behind = Problem(problem.map, vehicle, (0.3 * side, 0.3 * side, -1000.0), (0.7 * side, 0.3 * side, 1.0))
+    runs = runs_on(behind)
+    for _ in range(scaled(20)):
+        runs.run(256, None)
+
+
+def test_a_start_in_the_corner_of_the_lattice_with_a_heading_many_turns_below_0():
+    """Its cell is the first one, and no cell comes before that."""
+    problem = Problem(GridMap(np.zeros((40, 40)), 0.5), Vehicle(1.0, 0.1), (0.11, 0.11, 0.6 - 40 * math.tau), (15.0, 15.0, 0.0))
+    chain, _ = first_path(problem)
+    check(chain, problem)
+
+
+def test_the_distances_that_guide_it_are_not_changed():
+    problem = walled()
+    field = ClearanceField.of(problem.map)
+    to_goal = DistanceField.to_goal(problem, field)
+    before = to_goal.kernel.nodes().tobytes()
+    HybridAStarRuns(problem, Settings(seed=1), field, to_goal).run(2000, None)
+    assert to_goal.kernel.nodes().tobytes() == before
+
+
+def test_the_heap_of_a_run_orders_as_heapq_does():
+    heap = interpreted("heap").Heap
+    rng = np.random.default_rng(1)
+    for _ in range(scaled(200, least=20)):
+        expected, keys, item = [], heap(500), 0
+        for _ in range(500):
+            if expected and rng.random() < 0.4:
+                assert keys.least_key() == expected[0][0]
+                popped = keys.pop()
+                assert popped in {item for key, item in expected if key == expected[0][0]}
+                expected = [pair for pair in expected if pair[1] != popped]
+                heapq.heapify(expected)
+            else:
+                key = float(rng.integers(50)) if rng.random() < 0.5 else rng.random()
+                keys.push(item, key)
+                heapq.heappush(expected, (key, item))
+                item += 1
+            assert keys.count == len(expected)

@@ -1,0 +1,223 @@
+"""Searches with all that goes beyond the paper: bytes by seed and samples alone, never a longer path, none lost by pruning."""
+
+import math
+
+import naive
+import numpy as np
+import pytest
+from cases import (
+    SCALE,
+    chain_of,
+    contents,
+    field_of,
+    finish,
+    holed_polygons,
+    naive_clearance,
+    needs_compiled,
+    random_maps,
+    random_problem,
+    scaled,
+    search_on,
+)
+
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit, beside, load_map, plan, rrt
+from dubins_rrt_ros.planning.bounds import lower_bound
+from dubins_rrt_ros.planning.distance import DistanceField
+from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.share import maps_directory
+
+BUDGETS = (1, 7, 255, 256, 257, 600, 3000) if SCALE == 1 else (1, 7, 20, 40)
+KINDS = ["maze", "polygons", "late"] if SCALE == 1 else ["maze"]
+VEHICLE = Vehicle(1.0, 0.2)
+
+
+@pytest.fixture(scope="module")
+def problems():
+    """By name; `late` is one where hybrid A* finds nothing before the first samples do."""
+    polygons = holed_polygons(np.random.default_rng(1), "walls")
+    return {"maze": Problem(load_map(maps_directory() / "maze.yaml"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57)),
+            "polygons": Problem(polygons, Vehicle(0.4, 0.1), (0.5, 0.5, 1), (9, 9, 1)),
+            "late": Problem(polygons, Vehicle(0.4, 0.1), (0.5, 0.5, 1), (9, 9, 1), goal_tolerance_xy=0.3, goal_tolerance_yaw=0.3)}
+
+
+@pytest.fixture(params=KINDS)
+def problem(request, problems, monkeypatch):
+    if request.param == "late":
+        monkeypatch.setattr(rrt, "MOST_FIRST", 1)
+        monkeypatch.setattr(rrt, "EXPANSIONS", 16)
+    return problems[request.param]
+
+
+def searched(problem, **options):
+    return finish(search_on(problem, Settings(**{"seed": 1, "samples": scaled(1000, least=40), **options})))
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+def test_a_seed_determines_every_byte(planner, problem, monkeypatch):
+    """Not the time that a batch takes, nor the number of cores."""
+    once = searched(problem, planner=planner)
+    assert contents(searched(problem, planner=planner)) == contents(once)
+    for batch_time, cores in ((1e-9, 2), (1.0, 2), (0.005, 1), (0.005, 2))[:scaled(4, least=2)]:
+        monkeypatch.setattr(rrt, "BATCH_TIME", batch_time)
+        monkeypatch.setattr(beside, "cores", lambda cores=cores: cores)
+        other = searched(problem, planner=planner)
+        assert contents(other) == contents(once)
+        assert (other.best, other.samples) == (once.best, once.samples)
+
+
+def test_another_seed_gives_another_tree(problem):
+    assert contents(searched(problem, seed=2)) != contents(searched(problem))
+
+
+@pytest.mark.parametrize("options", [{}, {"step_size": 0.8}, {"shortcut": False}, {"informed": False}, {"planner": "rrt"}])
+def test_a_smaller_budget_is_the_beginning_of_a_larger_one(problem, options, monkeypatch):
+    """So a plan that was cut short can be had again with the samples that it took; and more of them never give a longer path."""
+    monkeypatch.setattr(rrt, "BATCH_TIME", 1e-9)  # batches of one sample, but for the first, of eight
+    whole, lengths = search_on(problem, Settings(samples=BUDGETS[-1], seed=1, **options)), []
+    for budget in BUDGETS:
+        part = searched(problem, samples=budget, **options)
+        assert part.samples <= budget
+        lengths.append(math.inf if part.length is None else part.length)
+        while whole.samples < part.samples or whole.best < 0 <= part.best or not whole.may_end:
+            whole.grow()
+        if part.samples not in (1, 7):
+            assert (whole.samples, contents(whole)) == (part.samples, contents(part))
+    assert lengths == sorted(lengths, reverse=True)
+
+
+@pytest.mark.parametrize("seed", range(scaled(30, least=3)))
+def test_the_best_path_on_random_problems(seed):
+    """Its length never rises, it reaches the goal free, no bound is above it, and the tree holds its invariants."""
+    rng = np.random.default_rng(200 + seed)
+    problem, clearance = random_problem(rng, random_maps(30)[seed])
+    if clearance(np.array([problem.start[:2]]))[0] < problem.vehicle.robot_radius:
+        return
+    step, best = float(rng.choice([0.0, 0.5])), math.inf
+    search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step))
+    while not search.done:
+        search.grow()
+        if search.best >= 0:
+            assert search.length <= best
+            best = search.length
+    tree = search.tree
+    tree.check(field_of(problem), problem.vehicle.robot_radius)
+    np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
+    assert step == 0 or tree.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
+    off = np.hypot(*(tree.poses[:, :2] - problem.goal[:2]).T)
+    turned = np.abs(np.remainder(tree.poses[:, 2] - problem.goal[2] + math.pi, math.tau) - math.pi)
+    reaching = (off <= problem.goal_tolerance_xy) & (turned <= problem.yaw_tolerance + 1e-12)
+    reaching[0] = False
+    assert (search.best >= 0) == reaching.any()
+    if search.best >= 0:
+        assert reaching[search.best]
+        assert search.length <= tree.costs[reaching].min() + 1e-9
+        assert search.path == tree.path_to(search.best)
+        assert audit(search.path, problem).ok
+        bound = lower_bound(problem, DistanceField.to_goal(problem, field_of(problem)).make_bound())
+        assert search.length >= bound - 1e-9
+
+
+@needs_compiled
+def test_what_is_left_out_would_not_have_helped():
+    """Without pruning, and with more samples, no path is shorter by more than what the samples' chance makes."""
+    rng, ratios = np.random.default_rng(8), []
+    for seed in range(16):
+        loose, clearance = random_problem(rng, random_maps(30)[seed])
+        problem = Problem(loose.map, loose.vehicle, loose.start, loose.goal, allow_unknown=loose.allow_unknown)
+        if clearance(np.array([problem.start[:2], problem.goal[:2]])).min() < problem.vehicle.robot_radius:
+            continue
+        pruned = searched(problem, samples=3000, seed=seed).length
+        all_kept = searched(problem, samples=5000, seed=seed, informed=False).length
+        if pruned and all_kept:
+            ratios.append(pruned / all_kept)
+    assert len(ratios) >= 5
+    assert max(ratios) < 1.01
+    assert np.mean(ratios) < 1.001
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
+    """While the bounds are still computed beside it."""
+    side = 700 if SCALE == 1 else 60
+    data = np.zeros((side, side))
+    data[side // 4:side // 2:side // 8, side // 10:-side // 10] = 100
+    problem = Problem(GridMap(data, 0.1), VEHICLE, (0.05 * side, 0.01 * side, 0.0), (0.09 * side, 0.09 * side, 1.0))
+    expected = lower_bound(problem, DistanceField.to_goal(problem, field_of(problem)).make_bound())
+    for seed in range(scaled(15, least=2)):
+        result = plan(problem, Settings(planner=planner, samples=1, seed=seed, planning_time=60.0))
+        assert result.status == Status.NONE
+        assert result.lower_bound == expected <= result.length
+
+
+@needs_compiled
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+@pytest.mark.parametrize("asked", [3, 4, 5, 6, 7, 9, 12, 16, 30, 60])
+def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems):
+    """By seed and number of samples, also where hybrid A* found the path before the first one."""
+    count = []
+    result = plan(problems["maze"], Settings(planner=planner, seed=3, samples=scaled(3000), planning_time=600.0),
+                  cancel=lambda: count.append(1) or len(count) >= asked)
+    if result.path is None:
+        assert result.status == Status.CANCELLED
+        return
+    again = plan(*read_request(to_document(result, "maze"), problems["maze"].map))
+    assert again.path == result.path
+    assert again.tree.poses.tobytes() == result.tree.poses.tobytes()
+    assert again.samples == result.samples
+
+
+@needs_compiled
+def test_a_plan_that_ran_out_of_time_is_had_again_by_its_file(problems, monkeypatch):
+    for limit in (0.05, 0.2, 1.0, 3.0):
+        with monkeypatch.context() as patched:
+            now = iter(np.arange(1e6) / 100)
+            patched.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda now=now: next(now))
+            result = plan(problems["maze"], Settings(seed=3, samples=1_000_000, planning_time=limit))
+        if result.path is None:
+            assert result.status == Status.TIMEOUT
+            continue
+        assert 0 < result.samples < 1_000_000
+        assert plan(*read_request(to_document(result, "maze"), problems["maze"].map)).path == result.path
+
+
+def street(width=0.6):
+    """A street around three corners that the vehicle just fits into, with no room beside it but at its ends."""
+    data = np.full((100, 100), 100)
+    cells = round(width / 0.1)
+    data[5:25, 5:25] = data[75:95, 75:95] = 0
+    data[15:15 + cells, 15:90] = 0
+    data[15:50, 90 - cells:90] = 0
+    data[50 - cells:50, 10:90] = 0
+    data[50 - cells:85, 10:10 + cells] = 0
+    data[85 - cells:85, 10:85] = 0
+    return Problem(GridMap(data, 0.1), Vehicle(0.3, 0.2), (1.0, 1.8, 0.0), (8.5, 8.2, 0.0))
+
+
+@needs_compiled
+def test_a_narrow_street_is_solved_by_every_seed():
+    """Where the plain algorithm, with as many samples, mostly fails."""
+    problem = street()
+    plain = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
+    statuses = [plan(problem, Settings(samples=3000, seed=seed, planning_time=60.0, **plain)).status for seed in range(4)]
+    assert statuses.count(Status.NONE) <= 1
+    for seed in range(20):
+        result = plan(problem, Settings(samples=600, seed=seed, planning_time=60.0))
+        assert result.status == Status.NONE, result.message
+        assert audit(result.path, problem).ok
+        assert result.length < 1.25 * result.lower_bound
+
+
+@pytest.mark.parametrize("step", [0.0, 0.7])
+def test_the_tree_holds_the_path_that_polishing_made(step, problems):
+    """In edges no longer than the step; and the start is where it was."""
+    problem = problems["maze"]
+    search = searched(problem, step_size=step, samples=1)
+    chain = chain_of(search.path)
+    clearance = naive_clearance(problem.map)
+    assert search.length == pytest.approx(chain.length, rel=1e-12)
+    assert tuple(chain.poses[0]) == problem.start
+    assert tuple(chain.poses[-1]) == problem.goal
+    assert clearance(chain.poses[:, :2]).min() >= problem.vehicle.robot_radius
+    if step:
+        assert chain.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
+        assert len(chain.words) > 25
