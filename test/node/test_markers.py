@@ -15,6 +15,8 @@ from dubins_rrt_ros.node.markers import tree_markers
 
 STAMP = Time(sec=12, nanosec=34)
 MANY = 50_000
+#: Turns are drawn by chords of 0.3 radii, which are sin(0.15) / 0.15 as long as their arcs.
+LEAST_DRAWN = 0.996
 
 
 @pytest.fixture
@@ -47,9 +49,8 @@ def test_each_part_is_one_marker_in_the_frame(markers):
 def test_the_tree_is_drawn_as_the_true_curves_of_its_edges(markers, plans):
     plan = plans["solved"]
     lines = xy(by_namespace(markers)["tree"]).reshape(-1, 2, 2)
-    # Turns are drawn by short chords, which are at most 0.2 % shorter, and straight arcs as they are.
     drawn, driven = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum(), plan.tree.lengths.sum()
-    assert 0.998 * driven < drawn <= driven
+    assert LEAST_DRAWN * driven < drawn <= driven
     ends = lines.reshape(-1, 2)
     for node in plan.tree.poses:
         assert np.linalg.norm(ends - node[:2], axis=1).min() < 1e-9
@@ -67,7 +68,7 @@ def test_the_path_is_drawn_from_start_to_goal(markers, plans):
     line = xy(by_namespace(markers)["path"])
     assert line[0].tolist() == [1.5, 5.0]
     assert line[-1].tolist() == [8.5, 5.0]
-    assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(plans["solved"].length, rel=1e-3)
+    assert LEAST_DRAWN * plans["solved"].length < np.linalg.norm(np.diff(line, axis=0), axis=1).sum() <= plans["solved"].length
 
 
 def test_without_a_path_start_and_goal_are_shown_and_no_empty_lines(plans, over_the_wire):
