@@ -192,3 +192,12 @@ def next_in_row(blocked):
         beside = [-1, *np.flatnonzero(blocked[row]), blocked.shape[1]]
         out[row, column] = [min(column - c for c in beside if c <= column), min(c - column for c in beside if c >= column)]
     return out
+
+
+def short_curves(rng, count):
+    """Poses and where random curves of all words shorter than pi lead from them; radius 1."""
+    for word in WORDS:
+        shares = rng.dirichlet((0.5, 0.5, 0.5), count // 6)
+        length = math.pi * rng.random((count // 6, 1)) ** rng.choice([0.1, 1, 3], (count // 6, 1))
+        starts = np.column_stack([rng.uniform(-5, 5, (count // 6, 2)), rng.uniform(-math.pi, math.pi, count // 6)])
+        yield starts, drive(starts, word, shares * length, 1.0)

@@ -299,33 +299,11 @@ def test_an_arc_is_no_full_circle_longer():
         assert shortest(arc.start, arc.end, 1.0).length <= length + 1e-9
 
 
-def short_curves(rng, count):
-    """Poses and where random curves of all words shorter than pi lead from them, by the naive way; radius 1."""
-    for word in naive.WORDS:
-        shares = rng.dirichlet((0.5, 0.5, 0.5), count // 6)
-        length = PI * rng.random((count // 6, 1)) ** rng.choice([0.1, 1, 3], (count // 6, 1))
-        starts = np.column_stack([rng.uniform(-5, 5, (count // 6, 2)), rng.uniform(-PI, PI, count // 6)])
-        yield starts, naive.drive(starts, word, shares * length, 1.0)
-
-
-def test_no_curve_shorter_than_half_a_circle_is_taken_to_need_one():
-    """A million of them, asked at both ends."""
-    kernel = interpreted("dubins")
-    asked = 0
-    for starts, goals in short_curves(np.random.default_rng(1), scaled(1_000_000)):
-        x, y = (goals - starts)[:, :2].T.tolist()
-        for theta in (starts[:, 2], goals[:, 2]):
-            sine, cosine = np.sin(theta).tolist(), np.cos(theta).tolist()
-            assert not any(map(kernel.takes_half_circle, x, y, sine, cosine))
-            asked += len(sine)
-    assert asked > scaled(1_900_000)
-
-
 def test_a_limit_lets_just_the_shorter_curves_pass():
     """Short ones and any, with limits a little above and a little below the length of the shortest."""
     rng, kernel = np.random.default_rng(2), interpreted("dubins")
     for radius in (1.0, 0.3):
-        pairs = list(short_curves(rng, scaled(12_000)))
+        pairs = list(naive.short_curves(rng, scaled(12_000)))
         pairs.append((np.column_stack([rng.uniform(-3, 3, (scaled(4000), 2)), rng.uniform(-PI, PI, scaled(4000))]),) * 2)
         pairs[-1] = pairs[-1][0], rng.permutation(pairs[-1][1])
         for starts, goals in pairs:

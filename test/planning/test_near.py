@@ -1,6 +1,7 @@
 """The near sets of RRT*, sample by sample against brute force, on the inner loops themselves."""
 
 import math
+from itertools import repeat
 
 import naive
 import numpy as np
@@ -9,6 +10,7 @@ from cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, Tree
 from dubins_rrt_ros.planning._kernels.grow import Grower
+from dubins_rrt_ros.planning._kernels.near import takes_half_circle
 from dubins_rrt_ros.planning._kernels.tree import SearchTree
 from dubins_rrt_ros.planning.dubins import shortest
 from dubins_rrt_ros.planning.rrt import MOST_NEAR, NEAR_FACTOR
@@ -191,6 +193,27 @@ def test_nodes_that_are_forgotten_are_no_neighbours(algorithm):
     assert wanted[new[new < known]].all()
     np.testing.assert_array_equal(after.parents[:known][wanted == 0], before.parents[wanted == 0])
     after.check(inner.field, NEED)
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.3])
+def test_no_curve_shorter_than_half_a_circle_is_taken_to_need_one(radius):
+    """Random ones, asked at both ends, and about a place beside the true one."""
+    rng = np.random.default_rng(1)
+    asked = ruled_out = 0
+    for starts, goals in naive.short_curves(rng, scaled(300_000)):
+        apart = radius * (goals - starts)[:, :2]
+        bearing, slack = rng.uniform(-math.pi, math.pi, len(apart)), 3 * radius * rng.random(len(apart)) ** 4
+        beside = apart + (0.999 * slack * (np.cos(bearing), np.sin(bearing))).T
+        for theta in (starts[:, 2], goals[:, 2]):
+            sine, cosine = np.sin(theta).tolist(), np.cos(theta).tolist()
+            for places, slacks in ((apart, np.zeros(len(apart))), (beside, slack)):
+                x, y = places.T.tolist()
+                assert not any(map(takes_half_circle, x, y, sine, cosine, repeat(radius), slacks.tolist()))
+                asked += len(x)
+            x, y = -apart.T
+            ruled_out += sum(map(takes_half_circle, x, y, sine, cosine, repeat(radius), repeat(0.0)))
+    assert asked > scaled(1_100_000)
+    assert ruled_out > 0.2 * asked
 
 
 def test_more_buckets_find_the_same_neighbours():

@@ -38,8 +38,6 @@ NEARLY_NONE = cython.declare(cython.double, 1e-6)
 FIT = cython.declare(cython.double, 2e-13)
 #: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
 COSINE_ERROR = cython.declare(cython.double, 1e-14)
-#: More than the rounding of a place, in turning radii.
-NEARLY_AHEAD = cython.declare(cython.double, 1e-9)
 NO_CURVE = cython.declare(cython.double, 1e300)
 
 
@@ -220,18 +218,6 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
 
 @cython.cfunc
 @cython.nogil
-@cython.inline
-@cython.exceptval(check=False)
-def takes_half_circle(x: cython.double, y: cython.double, sine: cython.double, cosine: cython.double) -> cython.bint:
-    """Whether no curve shorter than pi leads (x, y) ahead, by its heading at either end: such a curve neither gets behind itself
-    nor into the circles that it could turn on there."""
-    along: cython.double = x * cosine + y * sine
-    across: cython.double = fabs(y * cosine - x * sine)
-    return along < -NEARLY_AHEAD or x * x + y * y < 2 * across - NEARLY_AHEAD
-
-
-@cython.cfunc
-@cython.nogil
 @cython.exceptval(check=False)
 def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
                     theta1: cython.double, sin1: cython.double, cos1: cython.double, radius: cython.double,
@@ -254,8 +240,6 @@ def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double,
     word: cython.int
     if x == 0 and y == 0 and remainder(theta1 - theta0, TWO_PI) == 0:
         return 0, 0, 0, 0
-    if best <= PI and (takes_half_circle(x, y, sin0, cos0) or takes_half_circle(x, y, sin1, cos1)):
-        return 0, NO_CURVE, 0, 0
     for word in range(6):
         if word == 4 and best <= PI:
             break

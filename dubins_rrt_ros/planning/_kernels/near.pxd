@@ -1,3 +1,4 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 
 cdef class NearSet:
@@ -8,6 +9,7 @@ cdef class NearSet:
     cdef double guess
     cdef double usual
     cdef double most_cost
+    cdef double ahead
     cdef double x
     cdef double y
     cdef double theta
@@ -17,11 +19,14 @@ cdef class NearSet:
     cdef int[::1] nodes
     cdef signed char[::1] words
     cdef double[:, ::1] lengths
+    @cython.final
     cdef void begin(self, double x, double y, double theta, double reach) noexcept nogil
+    @cython.final
     cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
     cdef void consider(self, int node, double dx, double dy, double bound) noexcept nogil
-    cdef void consider_place(self, int row, int column) noexcept nogil
-    cdef void consider_bucket(self, int node) noexcept nogil
+    @cython.final
+    cdef void consider_bucket(self, int row, int column) noexcept nogil
+    @cython.final
     cdef void consider_all(self) noexcept nogil
     cdef void collect_nearest(self, double x, double y, double theta, int wanted, double within) noexcept nogil
     cdef void collect_useful(self, double x, double y, double theta, int wanted, double most_cost,

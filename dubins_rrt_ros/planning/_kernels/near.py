@@ -3,7 +3,8 @@
 
 S. Karaman and E. Frazzoli, Sampling-based optimal motion planning for non-holonomic dynamical systems (2013), have both.
 The search is exact: buckets are visited ring by ring, and a ring whose straight-line distance is too long ends it, since no
-Dubins curve is shorter than the straight line, nor than the turn from heading to heading.
+Dubins curve is shorter than the straight line, nor than the turn from heading to heading. Of what is nearer, most is ruled out as
+it lies behind or beside the vehicle: there, no curve leads that is shorter than half a circle.
 """
 
 import cython
@@ -27,6 +28,10 @@ RISE = cython.declare(cython.double, 1.1 ** 0.2)
 FALL = cython.declare(cython.double, 1.1 ** 0.8)
 #: No bound of the cost.
 UNLIMITED = cython.declare(cython.double, 1e300)
+#: From the middle of a square to its corners, by its side; a little more.
+HALF_DIAGONAL = cython.declare(cython.double, 0.7072)
+#: More than the rounding of a place, in turning radii.
+NEARLY = cython.declare(cython.double, 1e-9)
 #: The least guess, in turning radii: it grows by doubling, which must not begin at 0.
 LEAST_GUESS = cython.declare(cython.double, 1e-3)
 
@@ -43,6 +48,7 @@ class NearSet:
         self.tree = tree
         self.count = 0
         self.guess = self.usual = tree.radius
+        self.ahead = -1
         self.keys = np.empty(capacity)
         self.nodes = np.empty(capacity, np.int32)
         self.words = np.empty(capacity, np.int8)
@@ -83,6 +89,7 @@ class NearSet:
         self.consider_all()
 
     @cython.cfunc
+    @cython.final
     @cython.nogil
     @cython.exceptval(check=False)
     def begin(self, x: cython.double, y: cython.double, theta: cython.double, reach: cython.double) -> cython.void:
@@ -94,6 +101,7 @@ class NearSet:
         self.sin_theta, self.cos_theta = sin(theta), cos(theta)
 
     @cython.cfunc
+    @cython.final
     @cython.nogil
     @cython.exceptval(check=False)
     def insert(self, node: cython.int, word: cython.int, first: cython.double, second: cython.double,
@@ -141,43 +149,36 @@ class NearSet:
             self.insert(node, word, first, second, third)
 
     @cython.cfunc
+    @cython.final
     @cython.nogil
     @cython.exceptval(check=False)
-    def consider_place(self, row: cython.int, column: cython.int) -> cython.void:
-        """Consider the buckets of a place with headings that are within reach."""
-        sectors: cython.int = cython.cast(cython.int, self.tree.buckets.shape[2])
-        if sectors == 1:
-            self.consider_bucket(self.tree.buckets[row, column, 0])
-            return
-        turn: cython.double = self.reach / self.tree.radius
-        sector: cython.int = 0
-        count: cython.int = sectors
-        if turn < TWO_PI / 2:
-            sector = self.tree.sector_of(self.theta - turn)
-            count = min(sectors, 1 + (self.tree.sector_of(self.theta + turn) - sector + sectors) % sectors)
-            if count == 1 and turn > TWO_PI / sectors:
-                count = sectors
-        i: cython.int
-        for i in range(count):
-            self.consider_bucket(self.tree.buckets[row, column, (sector + i) % sectors])
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def consider_bucket(self, node: cython.int) -> cython.void:
-        """Consider the nodes of a bucket, from its first on, that the lower bound does not rule out."""
+    def consider_bucket(self, row: cython.int, column: cython.int) -> cython.void:
+        """Consider the nodes of a bucket that the lower bounds do not rule out."""
+        node: cython.int = self.tree.buckets[row, column]
+        radius: cython.double = self.tree.radius
+        is_short: cython.bint = self.reach <= TWO_PI / 2 * radius
         dx: cython.double
         dy: cython.double
         bound: cython.double
+        if node >= 0 and is_short:
+            dx = self.tree.x0 + (column + 0.5) * self.tree.bucket_size - self.x
+            dy = self.tree.y0 + (row + 0.5) * self.tree.bucket_size - self.y
+            if takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius,
+                                 HALF_DIAGONAL * self.tree.bucket_size):
+                return
         while node >= 0:
             dx = self.tree.poses[node, 0] - self.x
             dy = self.tree.poses[node, 1] - self.y
-            bound = max(sqrt(dx * dx + dy * dy), self.tree.radius * turned(self.theta, self.tree.poses[node, 2]))
-            if bound < self.reach:
+            bound = max(sqrt(dx * dx + dy * dy), radius * turned(self.theta, self.tree.poses[node, 2]))
+            if bound < self.reach and not (is_short and (
+                    takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius, 0)
+                    or takes_half_circle(self.ahead * dx, self.ahead * dy, self.tree.headings[node, 0],
+                                         self.tree.headings[node, 1], radius, 0))):
                 self.consider(node, dx, dy, bound)
             node = self.tree.next_in_bucket[node]
 
     @cython.cfunc
+    @cython.final
     @cython.nogil
     @cython.exceptval(check=False)
     def consider_all(self) -> cython.void:
@@ -201,17 +202,21 @@ class NearSet:
             for i in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
                 if i == row - ring or i == row + ring:
                     for j in range(max(column - ring, 0), min(column + ring, columns - 1) + 1):
-                        self.consider_place(i, j)
+                        self.consider_bucket(i, j)
                 else:
                     if column - ring >= 0:
-                        self.consider_place(i, column - ring)
+                        self.consider_bucket(i, column - ring)
                     if column + ring < columns:
-                        self.consider_place(i, column + ring)
+                        self.consider_bucket(i, column + ring)
 
 
 @cython.cclass
 class GainSet(NearSet):
     """The nodes that would be cheaper if they were reached *from* a node, within reach, with the curves to them."""
+
+    def __init__(self, tree: SearchTree, capacity: cython.int):
+        NearSet.__init__(self, tree, capacity)
+        self.ahead = 1
 
     @cython.cfunc
     @cython.nogil
@@ -257,3 +262,20 @@ def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
     if angle > TWO_PI / 2:
         angle = fabs(TWO_PI - angle)
     return angle if angle <= TWO_PI / 2 else 0
+
+
+@cython.ccall
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def takes_half_circle(x: cython.double, y: cython.double, sine: cython.double, cosine: cython.double, radius: cython.double,
+                      slack: cython.double) -> cython.bint:
+    """Whether no curve shorter than half a circle leads to (x, y), nor to what is at most `slack` away from there.
+
+    By the heading at its start, or that at its end: such a curve neither gets behind itself nor into the circles that it could
+    turn on there.
+    """
+    along: cython.double = x * cosine + y * sine
+    across: cython.double = fabs(y * cosine - x * sine) - slack
+    far: cython.double = sqrt(x * x + y * y) + slack
+    return along + slack < -NEARLY * radius or far * far < (2 * across - NEARLY * radius) * radius

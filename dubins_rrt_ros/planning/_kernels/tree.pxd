@@ -12,7 +12,7 @@ cdef class SearchTree:
     cdef int[::1] next_sibling
     cdef int[::1] previous_sibling
     cdef int[::1] next_in_bucket
-    cdef int[:, :, ::1] buckets
+    cdef int[:, ::1] buckets
     cdef double x0
     cdef double y0
     cdef double bucket_size
@@ -24,6 +24,5 @@ cdef class SearchTree:
     cdef void attach(self, int node, int parent, int word, double first, double second, double third) noexcept nogil
     cdef void update_costs_below(self, int root) noexcept nogil
     cdef void index(self, int node) noexcept nogil
-    cdef int sector_of(self, double theta) noexcept nogil
     cdef int bucket_row(self, double y) noexcept nogil
     cdef int bucket_column(self, double x) noexcept nogil

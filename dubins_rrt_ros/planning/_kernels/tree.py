@@ -5,18 +5,15 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.libc.math import cos, floor, sin, sqrt
+    from cython.cimports.libc.math import cos, sin, sqrt
 else:
-    from math import cos, floor, sin, sqrt
+    from math import cos, sin, sqrt
 
 
 #: About how many buckets there are at first. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
 BUCKETS = 1024
 #: There are made more of them where there are more than so many nodes for each, up to a largest number of them.
-MOST_PER_BUCKET, MOST_BUCKETS = 2, 1 << 22
-#: Into how many sectors headings are then divided, each with buckets of its own.
-SECTORS = 16
-TWO_PI = cython.declare(cython.double, 6.283185307179586476925286766559)
+MOST_PER_BUCKET, MOST_BUCKETS = 8, 1 << 22
 
 
 @cython.cclass
@@ -44,7 +41,7 @@ class SearchTree:
         self.radius = radius
         self.x0, self.y0 = corner
         self.x_extent, self.y_extent = extent
-        self.make_buckets(BUCKETS, 1)
+        self.make_buckets(BUCKETS)
         self.size = self.indexed = 0
         self.poses = np.empty((0, 3))
         self.headings = np.empty((0, 2))
@@ -86,15 +83,6 @@ class SearchTree:
         """The column of the bucket that holds `x`, the nearest outside the map."""
         column: cython.int = cython.cast(cython.int, (x - self.x0) / self.bucket_size)
         return min(max(column, 0), cython.cast(cython.int, self.buckets.shape[1]) - 1)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def sector_of(self, theta: cython.double) -> cython.int:
-        """The sector of the buckets that holds a heading, of any number of turns."""
-        sectors: cython.int = cython.cast(cython.int, self.buckets.shape[2])
-        turns: cython.double = theta / TWO_PI
-        return min(cython.cast(cython.int, (turns - floor(turns)) * sectors), sectors - 1)
 
     @cython.cfunc
     @cython.nogil
@@ -145,15 +133,14 @@ class SearchTree:
         """Put a node into its bucket."""
         row: cython.int = self.bucket_row(self.poses[node, 1])
         column: cython.int = self.bucket_column(self.poses[node, 0])
-        sector: cython.int = self.sector_of(self.poses[node, 2])
-        self.next_in_bucket[node] = self.buckets[row, column, sector]
-        self.buckets[row, column, sector] = node
+        self.next_in_bucket[node] = self.buckets[row, column]
+        self.buckets[row, column] = node
         self.indexed += 1
 
     def index_only(self, wanted: cython.schar[::1]):
         """Let only those of the (size,) nodes that are not 0 be found as neighbours from now on."""
         node: cython.int
-        self.buckets[:, :, :] = -1
+        self.buckets[:, :] = -1
         self.indexed = 0
         with cython.nogil:
             for node in range(self.size):
@@ -162,7 +149,7 @@ class SearchTree:
 
     def spread(self):
         """Make more buckets, if there are many nodes for each. To be called at moments that depend on the samples alone."""
-        count: cython.int = self.buckets.shape[0] * self.buckets.shape[1] * self.buckets.shape[2]
+        count: cython.int = self.buckets.shape[0] * self.buckets.shape[1]
         if self.indexed <= MOST_PER_BUCKET * count or count >= MOST_BUCKETS:
             return
         wanted = np.zeros(self.size, np.int8)
@@ -172,13 +159,13 @@ class SearchTree:
             wanted[nodes] = 1
             nodes = following[nodes]
             nodes = nodes[nodes >= 0]
-        self.make_buckets(16 * self.indexed, SECTORS)
+        self.make_buckets(self.indexed)
         self.index_only(wanted)
 
-    def make_buckets(self, count, sectors):
+    def make_buckets(self, count):
         """Make about `count` buckets, all empty."""
-        self.bucket_size = sqrt(self.x_extent * self.y_extent * sectors / count)
-        shape = (int(self.y_extent / self.bucket_size) + 1, int(self.x_extent / self.bucket_size) + 1, sectors)
+        self.bucket_size = sqrt(self.x_extent * self.y_extent / count)
+        shape = (int(self.y_extent / self.bucket_size) + 1, int(self.x_extent / self.bucket_size) + 1)
         self.buckets = np.full(shape, -1, dtype=np.int32)
 
     @cython.cfunc
