@@ -81,9 +81,6 @@ class Search:
         self._runs = self._portion = self._bound_to_goal = self._bound_from_start = None
         if settings.informed:
             self._runs = HybridAStarRuns(problem, settings, field, to_goal)
-            self._bound_to_goal = self._beside.start(to_goal.prepare_bound)
-            if settings.planner == "rrt_star":
-                self._bound_from_start = self._beside.start(lambda: DistanceField.from_start(problem, field).make_bound())
         self._from_start: DistanceField | None = None
         self._rng = np.random.default_rng((settings.seed, 2))  # apart from that of the samples
         self._block = self._sampler.draw(0)
@@ -157,6 +154,15 @@ class Search:
         self._take(self._runs.run(portion, None))
         if self.best >= 0 or self._runs.exhausted:
             self._expansions = 0
+        if self._expansions == 0:
+            self._begin_bounds()
+
+    def _begin_bounds(self) -> None:
+        """Begin to compute the lower bounds beside the search; not earlier, as that would keep the first path waiting."""
+        problem, field = self._problem, self._field
+        self._bound_to_goal = self._beside.start(self._to_goal.prepare_bound)
+        if self._settings.planner == "rrt_star":
+            self._bound_from_start = self._beside.start(lambda: DistanceField.from_start(problem, field).make_bound())
 
     def _take(self, found: Chain | None) -> None:
         """Add a path that hybrid A* found to the tree, if it is the best."""
