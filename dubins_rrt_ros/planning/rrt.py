@@ -50,8 +50,9 @@ MOST_NEAR = 512
 BLOCK = 256
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
-#: How many poses hybrid A* expands at a time, and how many before the first sample at most.
-EXPANSIONS, MOST_FIRST = 1024, 32_768
+#: How many poses hybrid A* expands at a time and at most before the first sample, and how many beside each block: of those, the
+#: search waits for the last.
+EXPANSIONS, MOST_FIRST, EXPANSIONS_BESIDE = 1024, 32_768, 512
 #: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
 POLISHINGS, WORTH_MORE = 3, 1e-4
 #: Nodes are forgotten when the best path became shorter by this share of its length.
@@ -209,7 +210,7 @@ class Search:
             self._take(self._portion())
             self._portion = None
         if self._runs and not self._runs.exhausted:
-            self._portion = self._beside.start(self._runs.run, EXPANSIONS, self.length)
+            self._portion = self._beside.start(self._runs.run, EXPANSIONS_BESIDE, self.length)
         self._is_news = True
         if self._settings.shortcut and self.best >= 0 and not self._is_polished:
             self._polishings = max(self._polishings, 1)
