@@ -34,7 +34,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 a path, 1 no path, 2 wrong usage, 130 interrupted.",
+    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 done, 1 no path, 2 wrong usage, 130 interrupted.",
                     description="Plans paths for a vehicle that drives forward and cannot turn on the spot.")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

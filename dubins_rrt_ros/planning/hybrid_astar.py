@@ -16,8 +16,9 @@ from .settings import Settings
 #: the cost-to-go is FIRST_WEIGHT. The finer ones are for what the coarser ones do not get through.
 FIRST_RUNS = ((0.6, 16), (0.3, 24), (0.15, 32))
 FIRST_WEIGHT = 1.5
-#: The next runs seek the shortest path. Later ones have arcs of random length, so that their lattices differ.
-NEXT_RUNS = ((0.4, 16), (0.3, 24))
+#: The next runs come closer and closer to the shortest path: the length of their arcs, the headings of their lattice, the weight.
+#: Later ones have arcs of random length, so that their lattices differ, and weigh the cost-to-go as it is.
+NEXT_RUNS = ((0.4, 16, 1.2), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
 LATER_ARCS = 0.25, 0.6
 #: After so many later runs in a row that found nothing better there are no more.
 MOST_IN_VAIN = 12
@@ -45,6 +46,11 @@ class HybridAStarRuns:
         self._begun = self._in_vain = 0
         self.exhausted = False
 
+    @property
+    def between_runs(self) -> bool:
+        """Whether the run begun last has ended."""
+        return self._current is None
+
     def run(self, expansions: int, best: float | None) -> Chain | None:
         """Expand so many poses.
 
@@ -55,7 +61,7 @@ class HybridAStarRuns:
             A path if the run under way came to one. Those much longer than `best` are not sought; others are polished before they
             are compared with it, where the settings allow that.
         """
-        if self._current is None:
+        if self.between_runs:
             self._current = self._next(best)
         self._current.run(expansions)
         if not self._current.ended:
@@ -88,7 +94,7 @@ class HybridAStarRuns:
             return *FIRST_RUNS[self._in_vain], FIRST_WEIGHT
         self._begun += 1
         if self._begun <= len(NEXT_RUNS):
-            return *NEXT_RUNS[self._begun - 1], 1.0
+            return NEXT_RUNS[self._begun - 1]
         arc = self._rng.uniform(*LATER_ARCS)
         return arc, math.ceil(8 / arc), 1.0
 

@@ -50,9 +50,10 @@ MOST_NEAR = 512
 BLOCK = 256
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
-#: How many poses hybrid A* expands at a time and at most before the first sample, and how many beside each block: of those, the
-#: search waits for the last.
-EXPANSIONS, MOST_FIRST, EXPANSIONS_BESIDE = 1024, 32_768, 512
+#: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
+EXPANSIONS, MOST_FIRST, MOST_SECOND = 1024, 32_768, 4096
+#: How many it expands beside each block, which waits for them.
+EXPANSIONS_BESIDE = 512
 #: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
 POLISHINGS, WORTH_MORE = 3, 1e-4
 #: Nodes are forgotten when the best path became shorter by this share of its length.
@@ -135,10 +136,10 @@ class Search:
     def grow(self) -> None:
         """Take one step of a few milliseconds: a portion of hybrid A*, a polishing, or a batch of samples, which ends early with
         the first path."""
-        if self._expansions > 0:
-            self._run_hybrid_astar()
-        elif self._polishings > 0:
+        if self._polishings > 0:
             self._polish()
+        elif self._expansions > 0:
+            self._run_hybrid_astar()
         else:
             self._draw_batch()
 
@@ -150,13 +151,16 @@ class Search:
         return self._to_goal.make_bound()
 
     def _run_hybrid_astar(self) -> None:
+        """Run it up to a first path, and then once more for a better one."""
+        had_none = self.best < 0
         portion = min(EXPANSIONS, self._expansions)
         self._expansions -= portion
-        self._take(self._runs.run(portion, None))
-        if self.best >= 0 or self._runs.exhausted:
-            self._expansions = 0
-        if self._expansions == 0:
+        self._take(self._runs.run(portion, self.length))
+        if had_none and (self.best >= 0 or self._runs.exhausted or self._expansions == 0):
             self._begin_bounds()
+            self._expansions = MOST_SECOND if self.best >= 0 else 0
+        elif self._runs.between_runs:
+            self._expansions = 0
 
     def _begin_bounds(self) -> None:
         """Begin to compute the lower bounds beside the search; not earlier, as that would keep the first path waiting."""

@@ -27,15 +27,16 @@ from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.share import maps_directory
 
 BUDGETS = (1, 7, 255, 256, 257, 600, 3000) if SCALE == 1 else (1, 7, 20, 40)
-KINDS = ["maze", "polygons", "late"] if SCALE == 1 else ["maze"]
+KINDS = ["maze", "polygons", "late", "brief"] if SCALE == 1 else ["maze"]
 VEHICLE = Vehicle(1.0, 0.2)
 
 
 @pytest.fixture(scope="module")
 def problems():
-    """By name; `late` is one where hybrid A* finds nothing before the first samples do."""
+    """By name; `late` is one where hybrid A* finds nothing before the first samples do, `brief` one whose second run is cut."""
     polygons = holed_polygons(np.random.default_rng(1), "walls")
     return {"maze": Problem(load_map(maps_directory() / "maze.yaml"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57)),
+            "brief": Problem(polygons, Vehicle(0.3, 0.1), (0.5, 0.5, 1), (9, 9, -2)),
             "polygons": Problem(polygons, Vehicle(0.4, 0.1), (0.5, 0.5, 1), (9, 9, 1)),
             "late": Problem(polygons, Vehicle(0.4, 0.1), (0.5, 0.5, 1), (9, 9, 1), goal_tolerance_xy=0.3, goal_tolerance_yaw=0.3)}
 
@@ -44,6 +45,9 @@ def problems():
 def problem(request, problems, monkeypatch):
     if request.param == "late":
         monkeypatch.setattr(rrt, "MOST_FIRST", 1)
+    if request.param == "brief":
+        monkeypatch.setattr(rrt, "MOST_SECOND", 20)
+    if request.param in ("late", "brief"):
         monkeypatch.setattr(rrt, "EXPANSIONS", 16)
     return problems[request.param]
 
@@ -82,6 +86,19 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one(problem, options, mon
             whole.grow()
         if part.samples not in (1, 7):
             assert (whole.samples, contents(whole)) == (part.samples, contents(part))
+    assert lengths == sorted(lengths, reverse=True)
+
+
+@needs_compiled
+def test_the_first_path_is_polished_and_another_sought_before_the_first_sample(problems):
+    search = search_on(problems["maze"], Settings(samples=1000, seed=1))
+    lengths, growths = [], 0
+    while search.samples == 0:
+        search.grow()
+        lengths += [search.length] if search.best >= 0 else []
+        growths += 1
+    assert growths < 20
+    assert lengths[-1] < 0.99 * lengths[0]
     assert lengths == sorted(lengths, reverse=True)
 
 

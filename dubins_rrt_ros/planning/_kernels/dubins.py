@@ -39,6 +39,8 @@ FIT = cython.declare(cython.double, 2e-13)
 #: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
 COSINE_ERROR = cython.declare(cython.double, 1e-14)
 NO_CURVE = cython.declare(cython.double, 1e300)
+#: No curve is longer, in turning radii; its square is finite.
+LONGEST = cython.declare(cython.double, 1e150)
 
 
 @cython.cfunc
@@ -229,7 +231,7 @@ def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double,
     x: cython.double = dx / radius
     y: cython.double = dy / radius
     left: cython.double = mod_two_pi(theta1 - theta0)
-    best: cython.double = limit / radius
+    best: cython.double = min(limit / radius, LONGEST)
     best_word: cython.int = 0
     best_t: cython.double = NO_CURVE
     best_p: cython.double = 0
