@@ -52,8 +52,8 @@ BLOCK = 256
 BATCH_TIME = 0.005
 #: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
 EXPANSIONS, MOST_FIRST, MOST_SECOND = 1024, 32_768, 4096
-#: How many it expands beside each block, which waits for them.
-EXPANSIONS_BESIDE = 512
+#: After so many blocks the search waits for as many poses as it expands beside them at most.
+BLOCKS_BESIDE, EXPANSIONS_BESIDE = 2, 1024
 #: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
 POLISHINGS, WORTH_MORE = 3, 1e-4
 #: Nodes are forgotten when the best path became shorter by this share of its length.
@@ -86,7 +86,7 @@ class Search:
         self._from_start: DistanceField | None = None
         self._rng = np.random.default_rng((settings.seed, 2))  # apart from that of the samples
         self._block = self._sampler.draw(0)
-        self._used = 0
+        self._used = self._blocks = 0
         self._batch = 8
         self._expansions = MOST_FIRST if settings.informed else 0  # due before the first sample
         self._polishings = 0  # due before the next sample
@@ -156,11 +156,12 @@ class Search:
         portion = min(EXPANSIONS, self._expansions)
         self._expansions -= portion
         self._take(self._runs.run(portion, self.length))
-        if had_none and (self.best >= 0 or self._runs.exhausted or self._expansions == 0):
-            self._begin_bounds()
-            self._expansions = MOST_SECOND if self.best >= 0 else 0
-        elif self._runs.between_runs:
+        if self._runs.exhausted or (self._runs.between_runs and not had_none):
             self._expansions = 0
+        if had_none and self.best >= 0:
+            self._expansions = MOST_SECOND
+        if had_none and (self.best >= 0 or self._expansions == 0):
+            self._begin_bounds()
 
     def _begin_bounds(self) -> None:
         """Begin to compute the lower bounds beside the search; not earlier, as that would keep the first path waiting."""
@@ -207,17 +208,23 @@ class Search:
             self._end_block()
 
     def _end_block(self) -> None:
-        """Take what was computed beside the block, and begin what is due after it."""
+        """Take what was computed beside the last blocks, and begin what is due after them."""
+        self._blocks += 1
         self._tree.spread()
         self._look_for_best()
-        if self._portion:
-            self._take(self._portion())
-            self._portion = None
-        if self._runs and not self._runs.exhausted:
-            self._portion = self._beside.start(self._runs.run, EXPANSIONS_BESIDE, self.length)
+        if self._runs and self._blocks % BLOCKS_BESIDE == 0:
+            self._take_portion()
         self._is_news = True
         if self._settings.shortcut and self.best >= 0 and not self._is_polished:
             self._polishings = max(self._polishings, 1)
+
+    def _take_portion(self) -> None:
+        """Take what hybrid A* found beside the search, and let it go on."""
+        if self._portion:
+            self._take(self._portion())
+            self._portion = None
+        if not self._runs.exhausted:
+            self._portion = self._beside.start(self._runs.run, EXPANSIONS_BESIDE, self.length)
 
     def _adopt(self, chain: Chain, end: int = -1) -> None:
         """Add a path to the tree; `end` is the node at its end, if the tree has it."""
