@@ -136,7 +136,7 @@ class Search:
     def grow(self) -> None:
         """Take one step of a few milliseconds: a portion of hybrid A*, a polishing, or a batch of samples, which ends early with
         the first path."""
-        if self._polishings > 0:
+        if self._polishings == POLISHINGS or (self._polishings > 0 and self._expansions == 0):
             self._polish()
         elif self._expansions > 0:
             self._run_hybrid_astar()
@@ -159,7 +159,7 @@ class Search:
         if self._runs.exhausted or (self._runs.between_runs and not had_none):
             self._expansions = 0
         if had_none and self.best >= 0:
-            self._expansions = MOST_SECOND
+            self._expansions = MOST_SECOND if self._settings.planner == "rrt_star" else 0
         if had_none and (self.best >= 0 or self._expansions == 0):
             self._begin_bounds()
 
