@@ -32,21 +32,27 @@ class DistanceField:
         kernel: the compiled field, for the planner's inner loop.
     """
 
-    def __init__(self, field: ClearanceField, need: float, source: tuple[float, float], tolerance: float = 0.0):
-        """The distances to all within `tolerance` [m] of `source`, where the clearance is at least `need` [m]."""
+    def __init__(self, field: ClearanceField, need: float, source: tuple[float, float], tolerance: float = 0.0,
+                 target: tuple[float, float] | None = None):
+        """The distances to all within `tolerance` [m] of `source`, where the clearance is at least `need` [m]. Until `make_bound`
+        they are found as far as asked, and those on the way to `target` first, if there is one."""
         block, squares = free_blocks(field, need)
         self._field, self._free = field, squares
-        self.kernel = CostField(field.kernel, block, squares, source, tolerance)
+        self.kernel = CostField(field.kernel, block, squares, source, tolerance, target)
 
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "DistanceField":
         """The distances to where the goal is reached."""
-        return cls(field, problem.vehicle.robot_radius, problem.goal[:2], problem.goal_tolerance_xy)
+        return cls(field, problem.vehicle.robot_radius, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
 
     @classmethod
     def from_start(cls, problem: Problem, field: ClearanceField) -> "DistanceField":
         """The distances from the start."""
         return cls(field, problem.vehicle.robot_radius, problem.start[:2])
+
+    def finish(self) -> None:
+        """Find all distances now, so that several threads may ask for them."""
+        self.kernel.finish()
 
     def prepare_bound(self) -> None:
         """Do most of the work of `make_bound` while the distances are still as they are: another thread may go on to use them."""

@@ -30,6 +30,7 @@ import time
 
 import numpy as np
 
+from ._kernels import COMPILED
 from ._kernels.grow import Grower
 from ._kernels.tree import SearchTree
 from .beside import Beside
@@ -47,13 +48,13 @@ from .tree import Tree
 NEAR_FACTOR = math.e * (1 + 1 / 3)
 MOST_NEAR = 512
 #: Samples are drawn in blocks of this size, however many are used: the draws depend neither on the time nor on the budget.
-BLOCK = 256
+BLOCK = 512
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
 #: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
-EXPANSIONS, MOST_FIRST, MOST_SECOND = 1024, 32_768, 4096
-#: After so many blocks the search waits for as many poses as it expands beside them at most.
-BLOCKS_BESIDE, EXPANSIONS_BESIDE = 2, 1024
+EXPANSIONS, MOST_FIRST, MOST_SECOND = (1024, 32_768, 4096) if COMPILED else (128, 512, 128)
+#: After a block the search waits for so many poses at most that it expanded beside it.
+EXPANSIONS_BESIDE = 1024
 #: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
 POLISHINGS, WORTH_MORE = 3, 1e-4
 #: Nodes are forgotten when the best path became shorter by this share of its length.
@@ -85,8 +86,8 @@ class Search:
             self._runs = HybridAStarRuns(problem, settings, field, to_goal)
         self._from_start: DistanceField | None = None
         self._rng = np.random.default_rng((settings.seed, 2))  # apart from that of the samples
-        self._block = self._sampler.draw(0)
-        self._used = self._blocks = 0
+        self._block = np.empty((0, 3))
+        self._used = 0
         self._batch = 8
         self._expansions = MOST_FIRST if settings.informed else 0  # due before the first sample
         self._polishings = 0  # due before the next sample
@@ -161,6 +162,8 @@ class Search:
         if had_none and self.best >= 0:
             self._expansions = MOST_SECOND if self._settings.planner == "rrt_star" else 0
         if had_none and (self.best >= 0 or self._expansions == 0):
+            if self.best < 0:
+                self._to_goal.finish()  # hybrid A* goes on beside the samples
             self._begin_bounds()
 
     def _begin_bounds(self) -> None:
@@ -208,11 +211,10 @@ class Search:
             self._end_block()
 
     def _end_block(self) -> None:
-        """Take what was computed beside the last blocks, and begin what is due after them."""
-        self._blocks += 1
+        """Take what was computed beside the last block, and begin what is due after it."""
         self._tree.spread()
         self._look_for_best()
-        if self._runs and self._blocks % BLOCKS_BESIDE == 0:
+        if self._runs:
             self._take_portion()
         self._is_news = True
         if self._settings.shortcut and self.best >= 0 and not self._is_polished:

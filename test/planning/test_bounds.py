@@ -221,13 +221,14 @@ def test_large_maps_have_large_squares(monkeypatch):
     assert found.kernel.shape == (23, 23)
 
 
+@pytest.mark.parametrize("has_target", [False, True])
 @pytest.mark.parametrize("kind", MAPS)
-def test_until_it_is_a_bound_the_distance_is_little_too_long(kind):
+def test_until_it_is_a_bound_the_distance_is_little_too_long(kind, has_target):
     """By some hundredths; what is prepared for the bound changes nothing, and to make it twice neither."""
     rng = np.random.default_rng(7)
     map = MAPS[kind](rng)
     points = free_points(rng, map, 0.3, 200)
-    field = DistanceField(ClearanceField.of(map), 0.25, points[0])
+    field = DistanceField(ClearanceField.of(map), 0.25, points[0], target=points[1] if has_target else None)
     found = field.at(points)
     field.prepare_bound()
     np.testing.assert_array_equal(field.at(points), found)
@@ -238,3 +239,21 @@ def test_until_it_is_a_bound_the_distance_is_little_too_long(kind):
     reached = np.isfinite(found)
     assert (bound[reached] <= found[reached]).all()
     assert (found[reached] <= 1.1 * bound[reached] + 2 * field.kernel.side).all()
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_distances_that_are_found_as_far_as_asked(kind):
+    """Whatever is asked first, and whether or not all are found first: the same places are reached, and none is much farther."""
+    rng = np.random.default_rng(8)
+    map = MAPS[kind](rng)
+    points = free_points(rng, map, 0.3, 60)
+    whole = DistanceField(ClearanceField.of(map), 0.25, points[0])
+    whole.finish()
+    expected = whole.at(points)
+    field = DistanceField(ClearanceField.of(map), 0.25, points[0], target=points[1])
+    one_by_one = np.concatenate([field.at(point[None]) for point in points[1:]])
+    field.finish()
+    for found in one_by_one, field.at(points)[1:]:
+        np.testing.assert_array_equal(np.isinf(found), np.isinf(expected[1:]))
+        reached = np.isfinite(found)
+        np.testing.assert_allclose(found[reached], expected[1:][reached], rtol=0.1, atol=2 * field.kernel.side)

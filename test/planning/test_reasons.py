@@ -10,7 +10,17 @@ import shapely
 from cases import SCALE, boxes_grid, empty_map, holed_polygons, maze_grid, naive_clearance
 from naive import are_connected, free_space
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, plan
+from dubins_rrt_ros.planning import (
+    ClearanceField,
+    GridMap,
+    PolygonMap,
+    Problem,
+    Settings,
+    Status,
+    Vehicle,
+    kernels_compiled,
+    plan,
+)
 from dubins_rrt_ros.planning import bounds as bounds_module
 from dubins_rrt_ros.planning.bounds import has_no_room, lattice_spacing, nearest_in_map
 from dubins_rrt_ros.planning.reasons import nearest_obstacle
@@ -315,7 +325,7 @@ def test_a_free_start_and_goal_are_not_blamed():
     assert near <= said <= near + 0.01
     assert f"60 of 60 samples drawn, {len(result.tree)} tree nodes, " in result.message
     assert result.culprit is None
-    late = why(hard, samples=1_000_000, planning_time=0.02)
+    late = why(hard, samples=1_000_000, planning_time=0.1 if kernels_compiled else 3.0)
     assert "allow more time, or loosen the goal's tolerance" in late.message
 
 

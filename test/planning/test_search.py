@@ -26,7 +26,7 @@ from dubins_rrt_ros.planning.distance import DistanceField
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.share import maps_directory
 
-BUDGETS = (1, 7, 255, 256, 257, 600, 3000) if SCALE == 1 else (1, 7, 20, 40)
+BUDGETS = (1, 7, rrt.BLOCK - 1, rrt.BLOCK, rrt.BLOCK + 1, 1100, 3000) if SCALE == 1 else (1, 7, 20, 40)
 KINDS = ["maze", "polygons", "late", "brief"] if SCALE == 1 else ["maze"]
 VEHICLE = Vehicle(1.0, 0.2)
 

@@ -13,8 +13,13 @@ cdef class Eikonal:
     cdef int[::1] order
     cdef int[::1] rank
     cdef int first, waiting, postponed, ordered, last
-    cdef double limit
+    cdef double limit, until, least_fall, target_column, target_row
+    cdef bint has_target
     cdef void seed(self, double column, double row, double reach) noexcept nogil
+    cdef double straight_on(self, int node) noexcept nogil
+    cdef void settle(self, int square) noexcept nogil
+    cdef void flood_up_to(self, int square) noexcept nogil
+    cdef bint is_settled(self, int square) noexcept nogil
     cdef void flood(self) noexcept nogil
     cdef void pass_on(self, int node, int neighbour) noexcept nogil
     cdef void offer(self, int node, double cost) noexcept nogil

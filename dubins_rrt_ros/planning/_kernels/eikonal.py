@@ -4,11 +4,12 @@
 Every free square is split into two triangles, along the diagonal that makes the steeper one less steep; the cost is linear on
 both. Its gradient is at most 1 on each, and nearly so on almost all.
 
-At first the equation is solved by upwind differences of first order, about in the order of the costs as in fast marching. Where
-ways fan out, around the source and around corners, that is too steep. So it is solved again with a gradient as much below 1
-there as it came out above, node by node in the order noted; a node that overtakes an earlier one passes its cost on once more.
-What is still too steep then, a few triangles by little, is cured by height: all costs between two levels are pressed together
-by the greatest gradient between these.
+At first the equation is solved by upwind differences of first order, about in the order of the costs as in fast marching; or, as
+in A*, in the order of the costs and the straight way on to a target, and only as far as asked. Where ways fan out, around the
+source and around corners, that is too steep. So it is solved again with a gradient as much below 1 there as it came out above,
+node by node in the order noted; a node that overtakes an earlier one passes its cost on once more. What is still too steep then,
+a few triangles by little, is cured by height: all costs between two levels are pressed together by the greatest gradient between
+these.
 """
 
 import cython
@@ -21,8 +22,12 @@ else:
 
 #: The cost of what is not reached.
 FAR = cython.declare(cython.double, 1e300)
-#: A smaller fall of a cost is not passed on [squares].
+#: A smaller fall of a cost is not passed on [squares]. On the way to a target more is let pass, since there a node often has its
+#: turn before both neighbours that its cost depends on, and falls by little, again and again, as others do behind it.
 LEAST_FALL = cython.declare(cython.double, 1e-4)
+LEAST_FALL_WITH_TARGET = cython.declare(cython.double, 0.1)
+#: By how much the limit is raised beyond what it takes for a node to have its turn: to let those beside it count for it too.
+AHEAD = cython.declare(cython.double, 2)
 #: How often the equation is solved again.
 REPEATS = cython.declare(cython.int, 3)
 #: So many levels of the cost make a side of a square.
@@ -52,17 +57,32 @@ class Eikonal:
         self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
         self.rank = np.full(free.size, free.size, np.int32)
         self.first = self.waiting = self.postponed = self.ordered = 0
-        self.limit, self.last = 1, free.size
+        self.last, self.until, self.least_fall = free.size, FAR, LEAST_FALL
+        self.has_target, self.target_column, self.target_row = False, 0, 0
 
-    def solve(self, column: cython.double, row: cython.double, reach: cython.double):
-        """Find the costs from all within `reach` of a place on; the nodes around it get no more than their distances to that.
-        Here and there they are too steep."""
+    def begin(self, column: cython.double, row: cython.double, reach: cython.double):
+        """Seek the costs from all within `reach` of a place on; the nodes around it get no more than their distances to that.
+        Here and there they come out too steep."""
         with cython.nogil:
+            self.limit = 1 + self.straight_on(cython.cast(cython.int, row) * self.width + cython.cast(cython.int, column))
             self.seed(column, row, reach)
+
+    def aim(self, column: cython.double, row: cython.double):
+        """Before `begin`: find the costs on the way to a place first, some hundredths too high."""
+        self.has_target, self.target_column, self.target_row = True, column, row
+        self.least_fall = LEAST_FALL_WITH_TARGET
+
+    def finish(self):
+        """Find the costs of all nodes."""
+        with cython.nogil:
+            if self.has_target:  # from here on the order of the costs is quicker
+                self.has_target, self.limit, self.least_fall = False, 0, LEAST_FALL
+            self.until = FAR
             self.flood()
 
     def flatten(self):
-        """Make the costs that `solve` found lower where they are too steep, once."""
+        """Make the costs lower where they are too steep, once; there must have been no target."""
+        self.finish()
         _: cython.int
         with cython.nogil:
             levels: cython.double = self.limit * LEVELS  # no cost is above the limit, and none rises
@@ -102,12 +122,54 @@ class Eikonal:
 
     @cython.cfunc
     @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def straight_on(self, node: cython.int) -> cython.double:
+        """How far a node is from the target, if there is one."""
+        if not self.has_target:
+            return 0
+        return hypot(node % self.width - self.target_column, node // self.width - self.target_row)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def settle(self, square: cython.int) -> cython.void:
+        """Make sure that the nodes of a free square have their costs, if they can be reached."""
+        if self.waiting + self.postponed > 0 and not self.is_settled(square):
+            self.flood_up_to(square)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def flood_up_to(self, square: cython.int) -> cython.void:
+        """Raise the limit until the nodes of a square have had their turns, and a little more."""
+        while self.waiting + self.postponed > 0 and not self.is_settled(square):
+            self.until = self.limit + 1
+            self.flood()
+        self.until = self.limit + AHEAD
+        self.flood()
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def is_settled(self, square: cython.int) -> cython.bint:
+        """Whether all nodes of a square have had their turns."""
+        return max(max(self.rank[square], self.rank[square + 1]),
+                   max(self.rank[square + self.width], self.rank[square + self.width + 1])) < self.size
+
+    @cython.cfunc
+    @cython.nogil
     @cython.exceptval(check=False)
     def flood(self) -> cython.void:
-        """Let costs pass from node to node until none falls, and note in which order the nodes had their turns."""
+        """Let costs pass from node to node until none below the limit falls, and note in which order the nodes had their turns;
+        raise the limit as far as `until`."""
         node: cython.int
         while self.waiting + self.postponed > 0:
             if self.waiting == 0:
+                if self.limit >= self.until:
+                    return
                 self.raise_limit()
                 continue
             node = self.dequeue()
@@ -138,10 +200,10 @@ class Eikonal:
     @cython.exceptval(check=False)
     def offer(self, node: cython.int, cost: cython.double) -> cython.void:
         """Let a node have a cost that is lower than its own, and wait to pass it on: at once only where it is below the limit."""
-        if cost >= self.cost[node] - LEAST_FALL:
+        if cost >= self.cost[node] - self.least_fall:
             return
         self.cost[node] = cost
-        if cost < self.limit:
+        if cost + self.straight_on(node) < self.limit:
             self.enqueue(node)
         elif self.state[node] == IDLE:
             self.state[node] = POSTPONED
@@ -162,7 +224,7 @@ class Eikonal:
             node = self.later[i]
             if self.state[node] != POSTPONED:  # it was queued meanwhile
                 continue
-            if self.cost[node] < self.limit:
+            if self.cost[node] + self.straight_on(node) < self.limit:
                 self.enqueue(node)
             else:
                 self.later[self.postponed] = node
@@ -241,7 +303,7 @@ class Eikonal:
     @cython.exceptval(check=False)
     def falls_behind(self, neighbour: cython.int, node: cython.int) -> cython.bint:
         """Whether a neighbour that had its turn costs more than a node, so that it may be reached from there."""
-        return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + LEAST_FALL
+        return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + self.least_fall
 
     @cython.cfunc
     @cython.nogil

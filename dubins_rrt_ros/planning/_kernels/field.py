@@ -74,49 +74,59 @@ class CostField:
         is_bound: whether the costs are bounds; before `make_bound` they can be too high by some hundredths.
     """
 
-    def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double):
+    def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double, target):
         """
         Args:
             block: how many cells of the clearance's raster are the side of a square.
             free: what `free_squares` returns for it.
             source: (x, y) in the map's frame [m].
             tolerance: the source is all that is within this distance of it [m].
+            target: (x, y), the costs on the way to which are found first, or None.
         """
         self.clearance, self.side = clearance, block * clearance.resolution
-        self.shape, self.width, self.size = free.shape, free.shape[1], free.size
-        x: cython.double = source[0]
-        y: cython.double = source[1]
-        self.tolerance = tolerance / self.side
-        self.column, self.row = self.place(x, y)
-        self.equation = Eikonal(free)
-        self.equation.solve(self.column, self.row, self.tolerance)
-        self.free, self.cost = self.equation.free, np.empty(free.size)
-        self.is_bound = self.is_flat = False
-        with cython.nogil:
-            self.measure(0)
+        self.squares, self.shape, self.width, self.size = free, free.shape, free.shape[1], free.size
+        self.tolerance, self.deduction, self.is_bound, self.flat = tolerance / self.side, 0, False, None
+        self.column, self.row = self.place(source[0], source[1])
+        self.take(self.begun(target))
 
     def prepare_bound(self):
         """Do the long part of `make_bound`, which leaves the costs as they are."""
-        if not self.is_flat:
-            self.equation.flatten()
-            self.is_flat = True
+        if self.flat is None:
+            flat: Eikonal = self.begun(None)
+            flat.flatten()
+            self.flat = flat
 
     def make_bound(self):
         """Make the costs as much lower as it takes that no path is shorter."""
         if self.is_bound:
             return
         self.prepare_bound()
+        self.take(self.flat)
         self.is_bound = True
-        with cython.nogil:
-            self.measure(0)
-            # At a point of the source the nodes around it have no more than their distances to it: sqrt(1 / 2) between them. The
-            # cost of the source is taken as it was before it was rounded down, so that it falls to 0 at least.
-            self.measure(sqrt(0.5) if self.tolerance > 0
-                         else (self.at_place(self.column, self.row) + ROUNDING) / (1 - ROUNDING) / self.side)
+        # At a point of the source the nodes around it have no more than their distances to it: sqrt(1 / 2) between them.
+        self.deduction = sqrt(0.5) if self.tolerance > 0 else self.squares_to(self.column, self.row)
+
+    def begun(self, target):
+        """The equation, begun at the source."""
+        equation: Eikonal = Eikonal(self.squares)
+        if target is not None:
+            equation.aim(*self.place(target[0], target[1]))
+        equation.begin(self.column, self.row, self.tolerance)
+        return equation
+
+    def take(self, equation: Eikonal):
+        """Let the costs be those of an equation."""
+        self.equation, self.free, self.cost = equation, equation.free, equation.cost
+
+    def finish(self):
+        """Find the costs of all nodes now, so that several threads may ask for them."""
+        self.equation.finish()
 
     def nodes(self):
         """float64 of `shape`: the costs of the nodes [m]; 1e300 where no way is."""
-        return np.asarray(self.cost).reshape(self.shape)
+        self.finish()
+        costs = np.asarray(self.cost).reshape(self.shape)
+        return np.where(costs < FAR, (costs - self.deduction) * self.side * (1 - ROUNDING) - ROUNDING, FAR)
 
     def values(self, points: cython.double[:, ::1], out: cython.double[::1]):
         """Write the costs at (n, 2) points of the map's frame to `out` [m]; 1e300 where no way is."""
@@ -127,6 +137,7 @@ class CostField:
 
     def descent(self, points: cython.double[:, ::1], out: cython.double[::1]):
         """Write where the cost falls at (n, 2) points of the map's frame to `out` [rad]; NaN where there is none."""
+        self.finish()
         i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(points.shape[0]):
@@ -140,17 +151,21 @@ class CostField:
         column: cython.double
         row: cython.double
         column, row = self.place(x, y)
-        return self.at_place(column, row)
+        cost: cython.double = self.squares_to(column, row)
+        return max(0.0, (cost - self.deduction) * self.side * (1 - ROUNDING) - ROUNDING) if cost < FAR else FAR
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def at_place(self, column: cython.double, row: cython.double) -> cython.double:
-        """The cost at a column and row, not below 0; 1e300 where no way is."""
+    def squares_to(self, column: cython.double, row: cython.double) -> cython.double:
+        """The cost at a column and row in sides of a square, with what is to be deducted; 1e300 where no way is."""
         square: cython.int = self.square_at(column, row)
-        if square < 0 or not self.free[square] or self.cost[square] >= FAR:
+        if square < 0 or not self.free[square]:
             return FAR
-        return max(0.0, self.within(square, column - square % self.width, row - square // self.width))
+        self.equation.settle(square)
+        if self.cost[square] >= FAR:
+            return FAR
+        return self.within(square, column - square % self.width, row - square // self.width)
 
     @cython.cfunc
     @cython.nogil
@@ -205,7 +220,7 @@ class CostField:
     @cython.nogil
     @cython.exceptval(check=False)
     def within(self, square: cython.int, along: cython.double, across: cython.double) -> cython.double:
-        """The cost at a place of a square, by its share of the side along the row and across."""
+        """The cost at a place of a square, as the nodes have it, by its share of the side along the row and across."""
         here: cython.double = self.cost[square]
         right: cython.double = self.cost[square + 1]
         above: cython.double = self.cost[square + self.width]
@@ -235,14 +250,3 @@ class CostField:
         if ahead < behind:
             return max(0.0, self.cost[node] - ahead)
         return -max(0.0, self.cost[node] - behind) if behind < FAR else 0.0
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def measure(self, source: cython.double) -> cython.void:
-        """Take the costs from the equation, in metres, and rounded down; `source` is the most that a place of the source has."""
-        node: cython.int
-        for node in range(self.size):
-            self.cost[node] = self.equation.cost[node]
-            if self.cost[node] < FAR:
-                self.cost[node] = (self.cost[node] - source) * self.side * (1 - ROUNDING) - ROUNDING
