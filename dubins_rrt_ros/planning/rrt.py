@@ -137,6 +137,8 @@ class Search:
     def grow(self) -> None:
         """Take one step of a few milliseconds: a portion of hybrid A*, a polishing, or a batch of samples, which ends early with
         the first path."""
+        if self._runs and (self.best >= 0 or self._expansions == 0):
+            self._begin_bounds()
         if self._polishings == POLISHINGS or (self._polishings > 0 and self._expansions == 0):
             self._polish()
         elif self._expansions > 0:
@@ -146,6 +148,7 @@ class Search:
 
     def make_bound(self) -> DistanceField:
         """Make the distances to the goal, which `informed` needs, lower bounds, when nothing beside the search works on them."""
+        self._begin_bounds()
         self._bound_to_goal()
         if self._portion:
             self._portion()
@@ -161,13 +164,13 @@ class Search:
             self._expansions = 0
         if had_none and self.best >= 0:
             self._expansions = MOST_SECOND if self._settings.planner == "rrt_star" else 0
-        if had_none and (self.best >= 0 or self._expansions == 0):
-            if self.best < 0:
-                self._to_goal.finish()  # hybrid A* goes on beside the samples
-            self._begin_bounds()
 
     def _begin_bounds(self) -> None:
-        """Begin to compute the lower bounds beside the search; not earlier, as that would keep the first path waiting."""
+        """Begin to compute the lower bounds beside the search, once; not earlier, as that would keep the first path waiting."""
+        if self._bound_to_goal:
+            return
+        if self.best < 0:
+            self._to_goal.finish()  # hybrid A* goes on beside the samples
         problem, field = self._problem, self._field
         self._bound_to_goal = self._beside.start(self._to_goal.prepare_bound)
         if self._settings.planner == "rrt_star":

@@ -13,7 +13,7 @@ cdef class Eikonal:
     cdef int[::1] order
     cdef int[::1] rank
     cdef int first, waiting, postponed, ordered, last
-    cdef double limit, until, least_fall, target_column, target_row
+    cdef double limit, until, least_fall, rise, target_column, target_row
     cdef bint has_target
     cdef void seed(self, double column, double row, double reach) noexcept nogil
     cdef double straight_on(self, int node) noexcept nogil

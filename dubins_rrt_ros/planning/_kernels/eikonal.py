@@ -26,8 +26,9 @@ FAR = cython.declare(cython.double, 1e300)
 #: turn before both neighbours that its cost depends on, and falls by little, again and again, as others do behind it.
 LEAST_FALL = cython.declare(cython.double, 1e-4)
 LEAST_FALL_WITH_TARGET = cython.declare(cython.double, 0.1)
-#: By how much the limit is raised beyond what it takes for a node to have its turn: to let those beside it count for it too.
-AHEAD = cython.declare(cython.double, 2)
+#: By how much the limit is raised at a time, without a target and with one [squares].
+RISE = cython.declare(cython.double, 1)
+RISE_WITH_TARGET = cython.declare(cython.double, 4)
 #: How often the equation is solved again.
 REPEATS = cython.declare(cython.int, 3)
 #: So many levels of the cost make a side of a square.
@@ -57,7 +58,7 @@ class Eikonal:
         self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
         self.rank = np.full(free.size, free.size, np.int32)
         self.first = self.waiting = self.postponed = self.ordered = 0
-        self.last, self.until, self.least_fall = free.size, FAR, LEAST_FALL
+        self.last, self.until, self.least_fall, self.rise = free.size, FAR, LEAST_FALL, RISE
         self.has_target, self.target_column, self.target_row = False, 0, 0
 
     def begin(self, column: cython.double, row: cython.double, reach: cython.double):
@@ -70,13 +71,13 @@ class Eikonal:
     def aim(self, column: cython.double, row: cython.double):
         """Before `begin`: find the costs on the way to a place first, some hundredths too high."""
         self.has_target, self.target_column, self.target_row = True, column, row
-        self.least_fall = LEAST_FALL_WITH_TARGET
+        self.least_fall, self.rise = LEAST_FALL_WITH_TARGET, RISE_WITH_TARGET
 
     def finish(self):
         """Find the costs of all nodes."""
         with cython.nogil:
             if self.has_target:  # from here on the order of the costs is quicker
-                self.has_target, self.limit, self.least_fall = False, 0, LEAST_FALL
+                self.has_target, self.limit, self.least_fall, self.rise = False, 0, LEAST_FALL, RISE
             self.until = FAR
             self.flood()
 
@@ -143,11 +144,11 @@ class Eikonal:
     @cython.nogil
     @cython.exceptval(check=False)
     def flood_up_to(self, square: cython.int) -> cython.void:
-        """Raise the limit until the nodes of a square have had their turns, and a little more."""
+        """Raise the limit until the nodes of a square have had their turns, and once more, since others may count for them."""
         while self.waiting + self.postponed > 0 and not self.is_settled(square):
-            self.until = self.limit + 1
+            self.until = self.limit + self.rise
             self.flood()
-        self.until = self.limit + AHEAD
+        self.until = self.limit + self.rise
         self.flood()
 
     @cython.cfunc
@@ -214,11 +215,11 @@ class Eikonal:
     @cython.nogil
     @cython.exceptval(check=False)
     def raise_limit(self) -> cython.void:
-        """Raise the limit by a square, and queue what is below it now."""
+        """Raise the limit, and queue what is below it now."""
         count: cython.int = self.postponed
         node: cython.int
         i: cython.int
-        self.limit += 1
+        self.limit += self.rise
         self.postponed = 0
         for i in range(count):
             node = self.later[i]
