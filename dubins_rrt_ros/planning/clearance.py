@@ -13,11 +13,14 @@ import shapely
 from scipy import ndimage
 
 from ._kernels import COMPILED
+from ._kernels.body import Body, PolygonBody
 from ._kernels.clearance import GridClearance, PolygonClearance
 from ._kernels.distance import fill_columns, look_aside
 from .dubins import WORDS, DubinsCurve
+from .footprint import cover
 from .map import GridMap, Map, PolygonMap
 from .problem import Pose
+from .vehicle import Vehicle
 
 #: A sample of a curve is free with this much more than the needed clearance [m]; it bounds the walk's shortest step.
 MARGIN = 0.0005
@@ -65,12 +68,25 @@ class ClearanceField:
             out[~shapely.contains_xy(self._polygons, points[..., 0], points[..., 1])] = 0
         return out
 
-    def curve_is_free(self, curve: DubinsCurve, need: float) -> bool:
-        """Whether the clearance along a curve is nowhere below `need` [m]."""
-        # The kernel's distance to polygons has no sign: what starts in free space stays there.
+    def body(self, vehicle: Vehicle) -> Body:
+        """The vehicle's body on the map, for one thread."""
+        if not vehicle.outline:
+            return Body(self.kernel, vehicle.robot_radius)
+        found = cover(vehicle.outline)
+        return PolygonBody(self.kernel, vehicle.inner_radius, found.discs, found.corners, found.first_corner,
+                           max(found.excess, 2 * MARGIN))
+
+    def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
+        """Whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
+        # The kernel's distance to polygons has no sign.
+        return bool(self.at(np.array(pose[:2])) > 0) and self.body(vehicle).is_free(*pose)
+
+    def curve_is_free(self, curve: DubinsCurve, vehicle: Vehicle) -> bool:
+        """Whether the vehicle touches no obstacle along a curve; see `_kernels/clearance.py` and `_kernels/body.py`."""
+        # What starts in free space stays there, as no edge is crossed.
         if not self.at(np.array(curve.start[:2])) > 0:
             return False
-        return self.kernel.is_curve_free(*curve.start, curve.radius, WORDS.index(curve.word), *curve.lengths, need)
+        return self.body(vehicle).is_curve_free(*curve.start, curve.radius, WORDS.index(curve.word), *curve.lengths)
 
     def cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the raster's cells that hold (..., 2) points of the map."""

@@ -39,6 +39,7 @@ class HybridAStarRuns:
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: DistanceField):
         self._problem, self._field, self._to_goal = problem, field, to_goal
+        self._body = field.body(problem.vehicle)
         self._rng = np.random.default_rng((settings.seed, 1))  # apart from that of the samples
         self._shortcut = settings.shortcut
         self._goals = _goals(problem)
@@ -84,9 +85,9 @@ class HybridAStarRuns:
         arc, sectors, weight = self._measures(best is None)
         problem, radius = self._problem, self._problem.vehicle.turning_radius
         corners = problem.map.corners()
-        return HybridAStar(self._field.kernel, problem.vehicle.robot_radius, radius, problem.start, self._goals,
-                           self._to_goal.kernel, corners.min(axis=0), np.ptp(corners, axis=0), arc * radius, sectors, weight,
-                           1e300 if best is None else SLACK * best, MOST_EXPANDED)
+        return HybridAStar(self._body, radius, problem.start, self._goals, self._to_goal.kernel, corners.min(axis=0),
+                           np.ptp(corners, axis=0), arc * radius, sectors, weight, 1e300 if best is None else SLACK * best,
+                           MOST_EXPANDED)
 
     def _measures(self, first: bool) -> tuple[float, int, float]:
         """The length of the next run's arcs in turning radii, its headings, and its weight of the cost-to-go."""

@@ -37,8 +37,8 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: M
         previous: a map that was prepared before; where this one differs from it in a part, only that is computed.
     """
     field = ClearanceField.of(map, allow_unknown, previous)
-    field.components(vehicle.robot_radius)
-    free_blocks(field, vehicle.robot_radius)
+    field.components(vehicle.inner_radius)
+    free_blocks(field, vehicle.inner_radius)
 
 
 def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = lambda: False,

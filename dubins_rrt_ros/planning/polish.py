@@ -1,4 +1,4 @@
-"""Shortcuts and detours: a path made shorter by Dubins curves that keep the same clearance."""
+"""Shortcuts and detours: a path made shorter by Dubins curves that are as free."""
 
 import numpy as np
 
@@ -17,11 +17,11 @@ def polished(chain: Chain, vehicle: Vehicle, field: ClearanceField, rng: np.rand
     """A path with the same ends that is never longer.
 
     Args:
-        chain: it is free for the vehicle's disc; so is the answer.
+        chain: it is free for the vehicle; so is the answer.
         fresh: whether it was not polished before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    polisher = Polisher(field.kernel, vehicle.robot_radius, vehicle.turning_radius, *chain, TRIES)
+    polisher = Polisher(field.body(vehicle), vehicle.turning_radius, *chain, TRIES)
     polisher.polish(draws, FRESH if fresh else KNOWN)
     arrays = (np.array(view[:polisher.count]) for view in (polisher.poses, polisher.words, polisher.lengths))
     return Chain(*arrays)

@@ -24,11 +24,14 @@ from .map import GridMap, Map
 from .problem import Pose, Problem
 from .result import Status
 from .tree import Tree
+from .vehicle import Vehicle
 
 #: The arcs that are tried to leave the start: their curvatures in the least turning radius.
 CURVATURES = np.linspace(-1, 1, 33)
 #: So many steps at most are taken along them.
 MOST_STEPS = 2000
+#: So many points across a footprint, and along each of its edges, tell where it touches something.
+POINTS = 33
 #: What an obstacle can be.
 OBSTACLE, UNKNOWN_SPACE, MAP_EDGE = "obstacle", "unknown space", "the map's edge"
 
@@ -53,11 +56,14 @@ def before_search(problem: Problem, field: ClearanceField) -> Reason | None:
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
             ("Goal", problem.goal, problem.goal_tolerance_xy, Status.GOAL_OUTSIDE_MAP, Status.GOAL_OCCUPIED)):
-        if has_no_room(field, problem.vehicle.robot_radius + MARGIN, pose[:2], tolerance):
+        if has_no_room(field, problem.vehicle.inner_radius + MARGIN, pose[:2], tolerance):
             nearest = nearest_in_map(problem.map, pose[:2])
             if math.dist(pose[:2], nearest) > ROUNDING:
                 return Reason(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
             return Reason(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
+        is_one_pose = pose is problem.start or problem.exact_goal
+        if problem.vehicle.outline and is_one_pose and not field.pose_is_free(pose, problem.vehicle):
+            return Reason(occupied, *_overlapping(problem, field, name, pose))
     if are_separated(problem, field):
         between, culprit = _unknown_between(problem, field) or _narrow_between(problem, field, widest_way(problem, field))
         return Reason(Status.NO_VALID_PATH, f"No path exists: {between}.", culprit)
@@ -86,7 +92,7 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str)
                 f"{_rounded_up(stuck[0])} m, the longest at {_at(stuck[1])}; move or turn the goal, or check turning_radius "
                 f"({radius:g} m)"), stuck[1]
     way = widest_way(problem, field)
-    if way is None or way.radius < problem.vehicle.robot_radius:
+    if way is None or way.radius < problem.vehicle.inner_radius:
         return _unknown_between(problem, field) or _narrow_between(problem, field, way)
     if len(tree) == 1:
         return f"no curve of the turning radius {radius:g} m left the start; set step_size, or allow more {more}", None
@@ -149,7 +155,7 @@ def _outside_message(problem: Problem, name: str, pose: Pose, tolerance: float, 
 
 def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, tolerance: float) -> tuple[str, Point]:
     """The sentence on a pose without room, and the nearest obstacle."""
-    need = problem.vehicle.robot_radius + MARGIN
+    need = problem.vehicle.inner_radius + MARGIN
     clearance = float(field.at(np.array(point)))
     nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, point, clearance)
     found, needed = _told_apart(clearance, need)
@@ -164,7 +170,54 @@ def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, 
     if clearance == 0 and what != MAP_EDGE:
         return f"{message}; {_at(point)} lies in {'an obstacle' if what == OBSTACLE else what}; move it.", nearest
     where = f"nearest obstacle {'' if what == OBSTACLE else f'is {what} '}at {_at(nearest)}"
-    return f"{message}; {where}; move it, or make robot_radius smaller if the robot is.", nearest
+    return f"{message}; {where}; move it, or {_smaller(problem.vehicle)}.", nearest
+
+
+def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose) -> tuple[str, Point]:
+    """The sentence on a pose at which the footprint touches something, and where."""
+    points = _points_of(problem.vehicle, pose)
+    clearance = field.at(points)
+    worst = tuple(points[np.argmin(clearance)].tolist())
+    nearest, what = nearest_in_map(problem.map, worst), MAP_EDGE
+    if math.dist(nearest, worst) <= ROUNDING:
+        nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, worst, float(clearance.min()))
+    message = f"{name} is occupied: the footprint touches {'an ' if what == OBSTACLE else ''}{what} at {_at(nearest)}"
+    if what == UNKNOWN_SPACE:
+        around = problem.map.window(pose[:2], 2 * problem.vehicle.robot_radius)
+        if ClearanceField(around, allow_unknown=True).pose_is_free(pose, problem.vehicle):
+            return f"{message}: drive there to map it, or set allow_unknown.", nearest
+    return f"{message}; move or turn it, or {_smaller(problem.vehicle)}.", nearest
+
+
+def _points_of(vehicle: Vehicle, pose: Pose) -> np.ndarray:
+    """(n, 2) points all over the footprint at a pose, its corners among them; for a disc, its centre."""
+    if not vehicle.outline:
+        return np.array([pose[:2]])
+    corners = np.array(vehicle.outline)
+    axes = [np.linspace(low, high, POINTS) for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)]
+    lattice = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    inside = lattice[shapely.contains_xy(shapely.Polygon(corners), lattice)]
+    edges = corners + np.linspace(0, 1, POINTS)[:, None, None] * (np.roll(corners, -1, axis=0) - corners)
+    x, y = np.concatenate([inside, edges.reshape(-1, 2)]).T
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.column_stack([pose[0] + c * x - s * y, pose[1] + s * x + c * y])
+
+
+def _smaller(vehicle: Vehicle) -> str:
+    """What may help where there is too little room."""
+    return f"make {_parameter(vehicle)} smaller if the robot is"
+
+
+def _parameter(vehicle: Vehicle) -> str:
+    """What says how much room the vehicle takes."""
+    return "footprint" if vehicle.outline else "robot_radius"
+
+
+def _size(vehicle: Vehicle) -> str:
+    """What takes room all around the reference point."""
+    if vehicle.outline:
+        return f"a footprint that is {2 * vehicle.inner_radius:.3g} m wide or more everywhere around its reference point"
+    return f"robot_radius {vehicle.robot_radius:g} m"
 
 
 def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Point] | None:
@@ -173,10 +226,10 @@ def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Poin
     if way is None:
         return None
     clearance = field.at(way.points)
-    first = int(np.argmax(clearance < problem.vehicle.robot_radius + MARGIN))
+    first = int(np.argmax(clearance < problem.vehicle.inner_radius + MARGIN))
     begins, _ = nearest_obstacle(problem.map, False, tuple(way.points[first].tolist()), float(clearance[first]))
-    return (f"unknown space separates start and goal for robot_radius {problem.vehicle.robot_radius:g} m; on the way between "
-            f"them it begins at {_at(begins)}; drive there to map it, or set allow_unknown"), begins
+    return (f"unknown space separates start and goal for {_size(problem.vehicle)}; on the way between them "
+            f"it begins at {_at(begins)}; drive there to map it, or set allow_unknown"), begins
 
 
 def _narrow_between(problem: Problem, field: ClearanceField, way: Way | None) -> tuple[str, Point | None]:
@@ -185,17 +238,19 @@ def _narrow_between(problem: Problem, field: ClearanceField, way: Way | None) ->
     Args:
         way: the widest one between them, if there is one.
     """
-    radius, smaller = problem.vehicle.robot_radius, "or make robot_radius smaller if the robot is"
+    vehicle, smaller = problem.vehicle, f"or {_smaller(problem.vehicle)}"
     if way and way.radius > MARGIN:
-        return (f"the widest way found between start and goal is {_metres(way.width)} m wide at {_at(way.narrowest)}; with "
-                f"radius {_rounded_down(way.radius - MARGIN)} m instead of {radius:g} m they are connected; check the map there, "
-                f"{smaller}"), way.narrowest
+        radius = _rounded_down(way.radius - MARGIN)
+        lack = (f"{_size(vehicle)} does not fit" if vehicle.outline
+                else f"with radius {radius} m instead of {vehicle.robot_radius:g} m they are connected")
+        return (f"the widest way found between start and goal is {_metres(way.width)} m wide at {_at(way.narrowest)}; {lack}; "
+                f"check the map there, {smaller}"), way.narrowest
     if are_walled_off(problem, field):
         walls = "walls or unknown space separate" if avoids_unknown(problem) else "walls separate"
-        return f"{walls} start and goal, so that no robot_radius is small enough; check the map", None
+        return f"{walls} start and goal, so that no {_parameter(vehicle)} is small enough; check the map", None
     width = _rounded_up(4 * lattice_spacing(problem.map, field))
-    return (f"no way between start and goal is wider than {width} m, and robot_radius is {radius:g} m; check the map, "
-            f"{smaller}"), None
+    need = f"{_size(vehicle)} does not fit" if vehicle.outline else f"robot_radius is {vehicle.robot_radius:g} m"
+    return f"no way between start and goal is wider than {width} m, and {need}; check the map, {smaller}", None
 
 
 def _distances(tree: Tree, pose: Pose) -> np.ndarray:
@@ -208,7 +263,7 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
 
     A vehicle that faces a wall closer than its turning radius is told by this. Arcs are walked by the clearance found.
     """
-    need = problem.vehicle.robot_radius + MARGIN
+    need = problem.vehicle.inner_radius + MARGIN
     curvature = CURVATURES / problem.vehicle.turning_radius
     driven = np.zeros(len(curvature))
     for _ in range(MOST_STEPS):

@@ -75,7 +75,7 @@ class Search:
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
         self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
-        self._grower = Grower(self._tree, field.kernel, vehicle.robot_radius, settings.step_size, NEAR_FACTOR, MOST_NEAR,
+        self._grower = Grower(self._tree, field.body(vehicle), settings.step_size, NEAR_FACTOR, MOST_NEAR,
                               problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
         self._sampler = Sampler(problem, settings, field, to_goal)

@@ -11,6 +11,7 @@ from .clearance import ClearanceField
 from .dubins import WORDS, DubinsCurve
 from .path import Path
 from .problem import Pose
+from .vehicle import Vehicle
 
 
 class TreeError(AssertionError):
@@ -82,8 +83,8 @@ class Tree:
                                 begins[arc] + (nth + end) * piece, out[:, end])
         return out
 
-    def check(self, field: ClearanceField | None = None, need: float = 0.0) -> None:
-        """Check the invariants, and where a field is given that every edge keeps the clearance `need` [m].
+    def check(self, field: ClearanceField | None = None, vehicle: Vehicle | None = None) -> None:
+        """Check the invariants, and where a field and a vehicle are given that it touches no obstacle along any edge.
 
         Raises:
             TreeError: one does not hold.
@@ -105,14 +106,14 @@ class Tree:
         if len(wrong):
             raise TreeError(f"the cost of node {wrong[0]} is not its parent's and the length of its edge")
         for node in range(1, n):
-            self._check_edge(node, field, need)
+            self._check_edge(node, field, vehicle)
 
-    def _check_edge(self, node: int, field: ClearanceField | None, need: float) -> None:
+    def _check_edge(self, node: int, field: ClearanceField | None, vehicle: Vehicle | None) -> None:
         curve = self.curve_to(node)
         x, y, theta = self.poses[node]
         end = curve.end
         off, turned = math.hypot(end[0] - x, end[1] - y), abs(math.remainder(end[2] - theta, math.tau))
         if not (off <= 1e-9 * (1 + curve.length) and turned <= 1e-9):
             raise TreeError(f"the edge to node {node} ends at {end}, not at ({x}, {y}, {theta})")
-        if field is not None and not field.curve_is_free(curve, need):
-            raise TreeError(f"the edge to node {node} does not keep the clearance {need} m")
+        if field is not None and not field.curve_is_free(curve, vehicle):
+            raise TreeError(f"the edge to node {node} is not free for {vehicle}")

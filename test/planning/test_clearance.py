@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap
+from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap, Vehicle
 from dubins_rrt_ros.planning.dubins import shortest
 
 MAPS = {
@@ -26,6 +26,11 @@ MAPS = {
     "polygons": lambda rng: holed_polygons(rng, "boxes"), "one cell": lambda rng: GridMap([[0]], 3.0, (0, 0, 0.3)),
 }
 GRIDS = ("boxes", "unknown", "crowded", "fine", "coarse", "empty", "maze", "one cell")
+
+
+def keeps(field, curve, need):
+    """Whether a disc of a radius is free along a curve."""
+    return field.curve_is_free(curve, Vehicle(robot_radius=float(need)))
 
 
 def random_points(rng, map, count, share_outside=0.2):
@@ -92,11 +97,11 @@ def test_a_curve_is_free_exactly_where_its_least_clearance_suffices(kind):
 def check_curve(field, clearance, curve):
     """Whether there was a clearance to tell the limit by."""
     least = clearance(naive.points_along(curve.start, curve.word, curve.lengths, curve.radius, 0.001)).min()
-    assert not field.curve_is_free(curve, least + 1e-9)
+    assert not keeps(field, curve, least + 1e-9)
     if least <= 0.0011:
         return False
-    assert field.curve_is_free(curve, least - 0.0011)
-    assert field.curve_is_free(curve, 0)
+    assert keeps(field, curve, least - 0.0011)
+    assert keeps(field, curve, 0)
     return True
 
 
@@ -148,8 +153,8 @@ def wall_grid(yaw=0.0):
 def test_along_a_wall(map, gap):
     curve = DubinsCurve((2 - gap, 2.0, math.pi / 2), 1.0, "LSL", (0.0, 10.0, 0.0))
     field = ClearanceField.of(map)
-    assert field.curve_is_free(curve, gap - 0.0006)
-    assert not field.curve_is_free(curve, gap + 1e-9)
+    assert keeps(field, curve, gap - 0.0006)
+    assert not keeps(field, curve, gap + 1e-9)
 
 
 @pytest.mark.parametrize("turn, x, gap", [("LSL", 1.5, 0.5), ("RSR", 0.25, 0.25)])
@@ -157,20 +162,20 @@ def test_a_turn_touches_at_its_widest(turn, x, gap):
     """A full turn of radius 0.25 m away from the wall, and one that comes within `gap` of a wall or an edge."""
     field = ClearanceField.of(wall_grid())
     curve = DubinsCurve((x, 10.0, math.pi / 2), 0.25, turn, (math.pi / 2, 0.0, 0.0))
-    assert field.curve_is_free(curve, gap - 0.0006)
-    assert not field.curve_is_free(curve, gap + 1e-9)
+    assert keeps(field, curve, gap - 0.0006)
+    assert not keeps(field, curve, gap + 1e-9)
 
 
 def test_no_way_between_squares_that_touch_at_a_corner():
     field = ClearanceField.of(GridMap([[0, 0, 100], [0, 0, 0], [100, 0, 0]][::-1], 1.0))
     through = DubinsCurve((0.5, 0.5, 0.0), 1.0, "LSL", (0.0, 2.0, 0.0))
-    assert not field.curve_is_free(through, 0.0)
+    assert not keeps(field, through, 0.0)
     data = np.zeros((4, 4))
     data[1, 1] = data[2, 2] = 100
     field = ClearanceField.of(GridMap(data, 1.0))
     diagonal = DubinsCurve((0.5, 3.5, -math.pi / 4), 1.0, "LSL", (0.0, 3 * math.sqrt(2), 0.0))
-    assert not field.curve_is_free(diagonal, 0.0)
-    assert not field.curve_is_free(DubinsCurve((0.5, 3.4, -math.pi / 4), 1.0, "LSL", (0.0, 3 * math.sqrt(2), 0.0)), 0.0)
+    assert not keeps(field, diagonal, 0.0)
+    assert not keeps(field, DubinsCurve((0.5, 3.4, -math.pi / 4), 1.0, "LSL", (0.0, 3 * math.sqrt(2), 0.0)), 0.0)
 
 
 @pytest.mark.parametrize("need", [0.0, 1e-6, 0.1])
@@ -180,8 +185,8 @@ def test_no_obstacle_is_too_thin(thickness, need):
     field = ClearanceField.of(thin)
     rng = np.random.default_rng(5)
     for x, y in rng.uniform((1.1, 1.1), (8, 8.9), (scaled(2000), 2)).tolist():
-        assert not field.curve_is_free(DubinsCurve((x, y, 0.0), 1.0, "LSL", (0.0, 18 - x, 0.0)), need)
-    assert field.curve_is_free(DubinsCurve((2.0, 0.5, 0.0), 1.0, "LSL", (0.0, 16.0, 0.0)), 0.4)
+        assert not keeps(field, DubinsCurve((x, y, 0.0), 1.0, "LSL", (0.0, 18 - x, 0.0)), need)
+    assert keeps(field, DubinsCurve((2.0, 0.5, 0.0), 1.0, "LSL", (0.0, 16.0, 0.0)), 0.4)
 
 
 def test_one_occupied_cell_is_not_jumped():
@@ -189,22 +194,22 @@ def test_one_occupied_cell_is_not_jumped():
     data[100, 100] = 100
     field = ClearanceField.of(GridMap(data, 0.05))
     for y in np.linspace(5.0, 5.05, 11):
-        assert not field.curve_is_free(DubinsCurve((1.0, y, 0.0), 1.0, "LSL", (0.0, 8.0, 0.0)), 0.0)
-    assert field.curve_is_free(DubinsCurve((1.0, 5.3, 0.0), 1.0, "LSL", (0.0, 8.0, 0.0)), 0.249)
+        assert not keeps(field, DubinsCurve((1.0, y, 0.0), 1.0, "LSL", (0.0, 8.0, 0.0)), 0.0)
+    assert keeps(field, DubinsCurve((1.0, 5.3, 0.0), 1.0, "LSL", (0.0, 8.0, 0.0)), 0.249)
 
 
 def test_out_of_the_map_and_back_is_not_free():
     field = ClearanceField.of(GridMap(np.zeros((20, 20)), 0.5))
     curve = DubinsCurve((9.5, 5.0, 0.0), 1.0, "LSL", (math.pi, 0.0, 0.0))
-    assert not field.curve_is_free(curve, 0.0)
-    assert field.curve_is_free(DubinsCurve((8.5, 5.0, 0.0), 1.0, "LSL", (math.pi, 0.0, 0.0)), 0.499)
+    assert not keeps(field, curve, 0.0)
+    assert keeps(field, DubinsCurve((8.5, 5.0, 0.0), 1.0, "LSL", (math.pi, 0.0, 0.0)), 0.499)
 
 
 def test_a_curve_of_length_0_is_its_pose():
     field = ClearanceField.of(wall_grid())
     still = DubinsCurve((1.5, 10.0, 0.0), 1.0, "LSL", (0.0, 0.0, 0.0))
-    assert field.curve_is_free(still, 0.499)
-    assert not field.curve_is_free(still, 0.5 + 1e-9)
+    assert keeps(field, still, 0.499)
+    assert not keeps(field, still, 0.5 + 1e-9)
 
 
 def test_a_cell_holds_the_points_over_it():

@@ -39,7 +39,7 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
     """One run."""
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
-    return HybridAStar(field.kernel, problem.vehicle.robot_radius, radius, problem.start, np.array([problem.goal]),
+    return HybridAStar(field.body(problem.vehicle), radius, problem.start, np.array([problem.goal]),
                        DistanceField.to_goal(problem, field).kernel, corners.min(axis=0), np.ptp(corners, axis=0),
                        arc * radius, sectors, weight, limit, most)
 
@@ -63,7 +63,7 @@ def check(chain, problem):
     at = np.array(problem.start)
     for i, curve in enumerate(path.curves, start=1):
         assert min(curve.lengths) >= 0
-        assert field_of(problem).curve_is_free(curve, problem.vehicle.robot_radius)
+        assert field_of(problem).curve_is_free(curve, problem.vehicle)
         end = naive.drive(at, curve.word, curve.lengths, curve.radius)
         np.testing.assert_allclose(end[:2], chain.poses[i, :2], atol=1e-8)
         assert abs(math.remainder(end[2] - chain.poses[i, 2], math.tau)) <= 1e-9

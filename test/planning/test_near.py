@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
 
-from dubins_rrt_ros.planning import ClearanceField, Tree
+from dubins_rrt_ros.planning import ClearanceField, Tree, Vehicle
 from dubins_rrt_ros.planning._kernels.grow import Grower
 from dubins_rrt_ros.planning._kernels.near import takes_half_circle
 from dubins_rrt_ros.planning._kernels.tree import SearchTree
@@ -17,6 +17,7 @@ from dubins_rrt_ros.planning.rrt import MOST_NEAR, NEAR_FACTOR
 
 GAIN = 1e-6
 NEED = 0.2
+VEHICLE = Vehicle(robot_radius=NEED)
 
 
 class Inner:
@@ -27,7 +28,7 @@ class Inner:
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.grown = SearchTree(root, radius, low, high - low)
-        self.grower = Grower(self.grown, self.field.kernel, NEED, step, NEAR_FACTOR, MOST_NEAR,
+        self.grower = Grower(self.grown, self.field.body(VEHICLE), step, NEAR_FACTOR, MOST_NEAR,
                              (1e6, 1e6, 0.0), 0.0, 0.0)
 
     def add(self, sample, algorithm="rrt_star"):
@@ -43,7 +44,7 @@ class Inner:
 
     def is_free(self, start, goal):
         """Whether the shortest curve between two poses is."""
-        return self.field.curve_is_free(shortest(tuple(start.tolist()), tuple(goal.tolist()), self.grown.radius), NEED)
+        return self.field.curve_is_free(shortest(tuple(start.tolist()), tuple(goal.tolist()), self.grown.radius), VEHICLE)
 
 
 def samples_on(map, count, seed=1):
@@ -136,7 +137,7 @@ def test_costs_follow_to_all_descendants():
         inner.add(sample)
     tree = inner.tree
     np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
-    tree.check(inner.field, NEED)
+    tree.check(inner.field, VEHICLE)
 
 
 @pytest.mark.parametrize("algorithm", ["rrt", "rrt_star"])
@@ -160,7 +161,7 @@ def test_a_goal_drawn_again_is_tried_from_elsewhere():
     tree = inner.tree
     (node,) = np.flatnonzero((tree.poses == goal).all(axis=1))
     assert tree.costs[node] == pytest.approx(shortest((-8.0, 0.0, 0.0), goal, 1.0).length, abs=1e-9)
-    tree.check(inner.field, NEED)
+    tree.check(inner.field, VEHICLE)
 
 
 @pytest.mark.parametrize("algorithm", ["rrt", "rrt_star"])
@@ -192,7 +193,7 @@ def test_nodes_that_are_forgotten_are_no_neighbours(algorithm):
     new = after.parents[known:]
     assert wanted[new[new < known]].all()
     np.testing.assert_array_equal(after.parents[:known][wanted == 0], before.parents[wanted == 0])
-    after.check(inner.field, NEED)
+    after.check(inner.field, VEHICLE)
 
 
 @pytest.mark.parametrize("radius", [1.0, 0.3])

@@ -55,7 +55,7 @@ def check(chain, problem, clearance):
     for curve in path.curves:
         assert min(curve.lengths) >= 0
         assert_close(at, curve.start)
-        assert field_of(problem).curve_is_free(curve, problem.vehicle.robot_radius)
+        assert field_of(problem).curve_is_free(curve, problem.vehicle)
         points = naive.points_along(curve.start, curve.word, curve.lengths, curve.radius, 0.02)
         assert clearance(points).min() >= problem.vehicle.robot_radius - 1e-9
         at = naive.drive(curve.start, curve.word, curve.lengths, curve.radius)

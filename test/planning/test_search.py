@@ -117,7 +117,7 @@ def test_the_best_path_on_random_problems(seed):
             assert search.length <= best
             best = search.length
     tree = search.tree
-    tree.check(field_of(problem), problem.vehicle.robot_radius)
+    tree.check(field_of(problem), problem.vehicle)
     np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
     assert step == 0 or tree.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
     off = np.hypot(*(tree.poses[:, :2] - problem.goal[:2]).T)

@@ -11,6 +11,7 @@ from cases import SCALE, boxes_grid, finish, free_pose, holed_polygons, naive_cl
 from dubins_rrt_ros.planning import ClearanceField, Problem, Settings, Tree, TreeError, Vehicle
 
 NEED = 0.2
+VEHICLE = Vehicle(robot_radius=NEED)
 
 
 def problem_on(kind, seed=1):
@@ -42,7 +43,7 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
         while not search.done:
             search.grow()
             tree = search.tree
-            tree.check(field, NEED)
+            tree.check(field, VEHICLE)
             assert len(tree) == search.size
             assert step_size == 0 or tree.lengths.sum(axis=1).max() <= step_size * (1 + 1e-9)
             np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
@@ -67,7 +68,7 @@ def small():
     """A tree to be corrupted, and the field that it was grown in."""
     search, field = grown(samples=100)
     tree = search.tree
-    tree.check(field, NEED)
+    tree.check(field, VEHICLE)
     return tree, field
 
 
@@ -127,8 +128,8 @@ def test_check_finds_arcs_of_negative_length():
 
 def test_check_finds_an_edge_that_is_too_near_an_obstacle(small):
     tree, field = small
-    with pytest.raises(TreeError, match=r"edge to node \d+ does not keep the clearance 1.5 m"):
-        tree.check(field, 1.5)
+    with pytest.raises(TreeError, match=r"edge to node \d+ is not free for Vehicle.*robot_radius=1.5"):
+        tree.check(field, Vehicle(robot_radius=1.5))
 
 
 def test_a_tree_of_its_root_alone():

@@ -11,6 +11,13 @@ cdef class Clearance:
                             double need) noexcept nogil
     cdef bint curve_is_free(self, double x, double y, double theta, double radius, int word,
                             double first, double second, double third, double need) noexcept nogil
+    cdef bint sweep_is_clear(self, double[:, ::1] corners, int first, int end, double along, double across,
+                             double[:, ::1] spans) noexcept nogil
+    cdef void span(self, double x0, double y0, double x1, double y1, double[:, ::1] spans) noexcept nogil
+    cdef int row_of(self, double y) noexcept nogil
+    cdef int column_of(self, double x) noexcept nogil
+    cdef bint spans_are_clear(self, int first_row, int last_row, double[:, ::1] spans, double[:, ::1] corners, int first,
+                              int end, double along, double across) noexcept nogil
 
 cdef class GridClearance(Clearance):
     cdef readonly int[:, ::1] aside

@@ -52,8 +52,8 @@ class Clearance:
         v: cython.double = self.cos_yaw * dy - self.sin_yaw * dx
         if not (0 <= u < self.width and 0 <= v < self.height):
             return 0
-        row: cython.int = min(cython.cast(cython.int, v / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
-        column: cython.int = min(cython.cast(cython.int, u / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
+        row: cython.int = self.row_of(v)
+        column: cython.int = self.column_of(u)
         bound: cython.double = cython.cast(cython.double, self.field[row, column])
         if bound < 0:
             return 0
@@ -105,6 +105,91 @@ class Clearance:
         x, y, theta = drive(x, y, theta, radius, turn_of(word, 2), third)
         return self.free(x, y, need)
 
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def sweep_is_clear(self, corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
+                       across: cython.double, spans: cython.double[:, ::1]) -> cython.bint:
+        """Whether a convex polygon that moves straight touches no obstacle and stays on the map.
+
+        Args:
+            corners: its corners are those from `first` up to `end`, without that, counter-clockwise, in the raster's frame [m].
+            along, across: how far it moves [m].
+            spans: (rows, 2) for the raster's rows, to work in.
+        """
+        left: cython.double = 1e300
+        right: cython.double = -1e300
+        low: cython.double = 1e300
+        high: cython.double = -1e300
+        i: cython.int
+        for i in range(first, end):
+            left = min(left, min(corners[i, 0], corners[i, 0] + along))
+            right = max(right, max(corners[i, 0], corners[i, 0] + along))
+            low = min(low, min(corners[i, 1], corners[i, 1] + across))
+            high = max(high, max(corners[i, 1], corners[i, 1] + across))
+        if not (left >= 0 and right < self.width and low >= 0 and high < self.height):
+            return False
+        first_row: cython.int = self.row_of(low)
+        last_row: cython.int = self.row_of(high)
+        for i in range(first_row, last_row + 1):
+            spans[i, 0], spans[i, 1] = 1e300, -1e300
+        before: cython.int = end - 1
+        for i in range(first, end):
+            self.span(corners[before, 0], corners[before, 1], corners[i, 0], corners[i, 1], spans)
+            if along != 0 or across != 0:
+                self.span(corners[before, 0] + along, corners[before, 1] + across, corners[i, 0] + along, corners[i, 1] + across,
+                          spans)
+                self.span(corners[i, 0], corners[i, 1], corners[i, 0] + along, corners[i, 1] + across, spans)
+            before = i
+        return self.spans_are_clear(first_row, last_row, spans, corners, first, end, along, across)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def span(self, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, spans: cython.double[:, ::1]
+             ) -> cython.void:
+        """Widen the spans of the rows that an edge leads through by what it covers of them."""
+        if y1 < y0:
+            x0, y0, x1, y1 = x1, y1, x0, y0
+        row: cython.int = self.row_of(y0)
+        last: cython.int = self.row_of(y1)
+        slope: cython.double = (x1 - x0) / (y1 - y0) if last > row else 0
+        at: cython.double = x0
+        after: cython.double
+        while row <= last:
+            after = x1
+            if row < last:  # where the edge leaves the row
+                after = min(max(x0 + slope * ((row + 1) * self.resolution - y0), min(x0, x1)), max(x0, x1))
+            spans[row, 0] = min(spans[row, 0], min(at, after))
+            spans[row, 1] = max(spans[row, 1], max(at, after))
+            at = after
+            row += 1
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def row_of(self, y: cython.double) -> cython.int:
+        """The row of the raster that holds a y in its frame."""
+        return min(cython.cast(cython.int, y / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def column_of(self, x: cython.double) -> cython.int:
+        """The column of the raster that holds an x in its frame."""
+        return min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
+                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
+                        across: cython.double) -> cython.bint:
+        """Whether no obstacle is touched by what `sweep_is_clear` asks for, of which `spans` are the parts in the rows."""
+        return True
+
     def distances(self, points: cython.double[:, ::1], out: cython.double[::1]):
         """Write the exact clearance at (n, 2) points of the map's frame to `out` [m]."""
         i: cython.Py_ssize_t
@@ -152,8 +237,8 @@ class GridClearance(Clearance):
         nearest: cython.double = Clearance.exact(self, x, y)
         nearest = nearest * nearest
         rows: cython.int = cython.cast(cython.int, self.field.shape[0])
-        row: cython.int = min(cython.cast(cython.int, y / self.resolution), rows - 1)
-        column: cython.int = min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
+        row: cython.int = self.row_of(y)
+        column: cython.int = self.column_of(x)
         nearest = min(nearest, self.squared_across(x, row, column))
         up: cython.double = (row + 1) * self.resolution - y
         down: cython.double = y - row * self.resolution
@@ -167,6 +252,27 @@ class GridClearance(Clearance):
             up += self.resolution
             down += self.resolution
         return sqrt(nearest)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
+                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
+                        across: cython.double) -> cython.bint:
+        """Whether no cell in the spans is occupied: from each, go on to where the next occupied one to the right may be."""
+        row: cython.int
+        column: cython.int
+        last: cython.int
+        aside: cython.int
+        for row in range(first_row, last_row + 1):
+            column = self.column_of(spans[row, 0])
+            last = self.column_of(spans[row, 1])
+            while column <= last:
+                aside = self.aside[row, column]
+                if aside == 0:
+                    return False
+                column += (aside >> 2) + (aside >> 1 & 1)
+        return True
 
 
 @cython.cclass
@@ -188,14 +294,72 @@ class PolygonClearance(Clearance):
     @cython.exceptval(check=False)
     def exact(self, x: cython.double, y: cython.double) -> cython.double:
         """The distance to the nearest edge."""
-        row: cython.int = min(cython.cast(cython.int, y / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
-        column: cython.int = min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
+        row: cython.int = self.row_of(y)
+        column: cython.int = self.column_of(x)
         cell: cython.Py_ssize_t = row * self.field.shape[1] + column
         nearest: cython.double = 1e300
         i: cython.Py_ssize_t
         for i in range(self.first_edge[cell], self.first_edge[cell + 1]):
             nearest = min(nearest, squared_to_segment(x, y, self.edges, self.edge_of[i]))
         return sqrt(nearest)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
+                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
+                        across: cython.double) -> cython.bint:
+        """Whether no edge is touched: where one is, it is the nearest one to a point of a cell in the spans, at no distance."""
+        row: cython.int
+        column: cython.int
+        cell: cython.Py_ssize_t
+        i: cython.Py_ssize_t
+        for row in range(first_row, last_row + 1):
+            for column in range(self.column_of(spans[row, 0]), self.column_of(spans[row, 1]) + 1):
+                if self.field[row, column] > 0:
+                    continue
+                cell = row * self.field.shape[1] + column
+                for i in range(self.first_edge[cell], self.first_edge[cell + 1]):
+                    if sweep_meets_segment(corners, first, end, along, across, self.edges, self.edge_of[i]):
+                        return False
+        return True
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def sweep_meets_segment(corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
+                        across: cython.double, edges: cython.double[:, ::1], edge: cython.int) -> cython.bint:
+    """Whether a convex polygon that moves straight touches an edge: no line along a side of either keeps them apart."""
+    before: cython.int = end - 1
+    i: cython.int
+    for i in range(first, end):
+        if lies_beyond(corners[i, 1] - corners[before, 1], corners[before, 0] - corners[i, 0], corners, first, end, along, across,
+                       edges, edge):
+            return False
+        before = i
+    dx: cython.double = edges[edge, 2] - edges[edge, 0]
+    dy: cython.double = edges[edge, 3] - edges[edge, 1]
+    return not (lies_beyond(dy, -dx, corners, first, end, along, across, edges, edge)
+                or lies_beyond(-dy, dx, corners, first, end, along, across, edges, edge)
+                or lies_beyond(across, -along, corners, first, end, along, across, edges, edge)
+                or lies_beyond(-across, along, corners, first, end, along, across, edges, edge))
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def lies_beyond(normal_x: cython.double, normal_y: cython.double, corners: cython.double[:, ::1], first: cython.int,
+                end: cython.int, along: cython.double, across: cython.double, edges: cython.double[:, ::1], edge: cython.int
+                ) -> cython.bint:
+    """Whether an edge is farther in a direction than all of a convex polygon that moves straight."""
+    farthest: cython.double = -1e300
+    i: cython.int
+    for i in range(first, end):
+        farthest = max(farthest, normal_x * corners[i, 0] + normal_y * corners[i, 1])
+    farthest += max(0.0, normal_x * along + normal_y * across)
+    return min(normal_x * edges[edge, 0] + normal_y * edges[edge, 1],
+               normal_x * edges[edge, 2] + normal_y * edges[edge, 3]) > farthest
 
 
 @cython.cfunc

@@ -9,7 +9,7 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, shortest, turn_of
     from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.near import GainSet, NearSet
@@ -18,7 +18,7 @@ if cython.compiled:
 else:
     from math import ceil, fabs, log, remainder
 
-    from .clearance import Clearance
+    from .body import Body
     from .dubins import TWO_PI, drive, shortest, turn_of
     from .field import CostField
     from .near import GainSet, NearSet
@@ -43,8 +43,7 @@ class Grower:
     """
 
     tree: SearchTree
-    clearance: Clearance
-    need: cython.double
+    body: Body
     step: cython.double
     longest: cython.double
     near_factor: cython.double
@@ -64,18 +63,16 @@ class Grower:
     goal_nodes: cython.int[::1]
     goal_count = cython.declare(cython.int, visibility="readonly")
 
-    def __init__(self, tree: SearchTree, clearance: Clearance, need, step, near_factor, most_near, goal,
-                 tolerance_xy, tolerance_yaw):
+    def __init__(self, tree: SearchTree, body: Body, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
         """
         Args:
-            need: the clearance that every edge keeps [m].
+            body: what must be free along every edge.
             step: the longest new edge [m]; 0 is unlimited.
             near_factor: near sets have near_factor * log(size) nodes, at most `most_near`.
             goal: (x, y, theta); tolerance_xy [m] and tolerance_yaw [rad] say what counts as reaching it.
         """
         self.tree = tree
-        self.clearance = clearance
-        self.need, self.step, self.near_factor = need, step, near_factor
+        self.body, self.step, self.near_factor = body, step, near_factor
         self.longest = step * (1 + ROUNDING) if step > 0 else NO_WAY
         self.goal_x, self.goal_y, self.goal_theta = goal
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
@@ -159,7 +156,7 @@ class Grower:
         first: cython.double
         second: cython.double
         third: cython.double
-        if self.step == 0 and not self.clearance.free(x, y, self.need):
+        if self.step == 0 and not self.body.free(x, y, theta):
             return
         x, y, theta, word, first, second, third = self.steer(x, y, theta)
         if self.closest.count == 0 or first + second + third == 0:
@@ -180,7 +177,7 @@ class Grower:
             x, y, theta, word, first, second, third = self.steer(x, y, theta)
             if self.closest.count == 0:
                 return
-        if not self.clearance.free(x, y, self.need):
+        if not self.body.free(x, y, theta):
             return
         limit: cython.double = self.limit
         if self.bounded:
@@ -321,9 +318,9 @@ class Grower:
     @cython.exceptval(check=False)
     def edge_is_free(self, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
                      third: cython.double) -> cython.bint:
-        """Whether the curve from a node keeps its clearance."""
-        return self.clearance.curve_is_free(self.tree.poses[parent, 0], self.tree.poses[parent, 1], self.tree.poses[parent, 2],
-                                            self.tree.radius, word, first, second, third, self.need)
+        """Whether the curve from a node is free."""
+        return self.body.curve_is_free(self.tree.poses[parent, 0], self.tree.poses[parent, 1], self.tree.poses[parent, 2],
+                                       self.tree.radius, word, first, second, third)
 
     @cython.cfunc
     @cython.nogil

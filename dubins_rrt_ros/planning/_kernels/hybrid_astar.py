@@ -10,7 +10,7 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, shortest_within
     from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
@@ -18,7 +18,7 @@ if cython.compiled:
 else:
     from math import cos, remainder, sin
 
-    from .clearance import Clearance
+    from .body import Body
     from .dubins import NO_CURVE, TWO_PI, drive, shortest_within
     from .field import CostField
     from .heap import Heap
@@ -39,8 +39,7 @@ class HybridAStar:
         ended: whether a path was found, or nothing is left to expand.
     """
 
-    clearance: Clearance
-    need: cython.double
+    body: Body
     radius: cython.double
     to_goal: CostField
     goals: cython.double[:, ::1]
@@ -67,11 +66,10 @@ class HybridAStar:
     last_word: cython.int
     last_lengths: cython.double[::1]
 
-    def __init__(self, clearance: Clearance, need, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight,
-                 limit, most):
+    def __init__(self, body: Body, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight, limit, most):
         """
         Args:
-            need: the clearance that all arcs keep [m].
+            body: what must be free along all arcs.
             start: (x, y, theta); goals: (m, 3) poses any of which will do.
             to_goal: the distances to the goal.
             corner, extent: lowest (x, y) of the map, and its size [m].
@@ -80,7 +78,7 @@ class HybridAStar:
             limit: paths that are not shorter are not sought [m].
             most: no more poses are expanded.
         """
-        self.clearance, self.need, self.radius = clearance, need, radius
+        self.body, self.radius = body, radius
         self.to_goal, self.goals = to_goal, goals
         self.x0, self.y0 = corner
         self.arc, self.cell, self.sectors, self.weight, self.limit = arc, 0.7 * arc, sectors, weight, limit
@@ -157,9 +155,9 @@ class HybridAStar:
                 limit = first + second + third
                 self.last_goal, self.last_word = goal, word
                 self.last_lengths[0], self.last_lengths[1], self.last_lengths[2] = first, second, third
-        return self.last_goal >= 0 and self.clearance.curve_is_free(
+        return self.last_goal >= 0 and self.body.curve_is_free(
             self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius, self.last_word,
-            self.last_lengths[0], self.last_lengths[1], self.last_lengths[2], self.need)
+            self.last_lengths[0], self.last_lengths[1], self.last_lengths[2])
 
     @cython.cfunc
     @cython.nogil
@@ -171,7 +169,7 @@ class HybridAStar:
         theta: cython.double
         x, y, theta = drive(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius, turn, self.arc)
         theta = remainder(theta, TWO_PI)
-        if not self.clearance.free(x, y, self.need):
+        if not self.body.free(x, y, theta):
             return
         cost: cython.double = self.costs[node] + self.arc
         cell: cython.int = self.cell_of(x, y, theta)
@@ -181,9 +179,8 @@ class HybridAStar:
         more: cython.double = self.cost_to_go(x, y, theta, self.limit - cost)
         if cost + more >= self.limit:
             return
-        if not self.clearance.curve_is_free(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius,
-                                            1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0,
-                                            self.need):
+        if not self.body.curve_is_free(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius,
+                                       1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0):
             return
         self.best_cost[cell] = cython.cast(cython.float, cost)
         self.add(x, y, theta, cost, node, turn, cost + self.weight * more)

@@ -10,13 +10,13 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
+    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, shortest_within, turn_of
     from cython.cimports.libc.math import cos, exp, log, remainder, sin
 else:
     from math import cos, exp, log, remainder, sin
 
-    from .clearance import Clearance
+    from .body import Body
     from .dubins import NO_CURVE, TWO_PI, drive, shortest_within, turn_of
 
 #: A smaller gain is rounding [m].
@@ -44,8 +44,7 @@ class Polisher:
         ends: (n,): how far along the path the poses are [m].
     """
 
-    clearance: Clearance
-    need: cython.double
+    body: Body
     radius: cython.double
     count = cython.declare(cython.int, visibility="readonly")
     poses = cython.declare(cython.double[:, ::1], visibility="readonly")
@@ -66,14 +65,14 @@ class Polisher:
     new_words: cython.schar[::1]
     new_lengths: cython.double[:, ::1]
 
-    def __init__(self, clearance: Clearance, need: cython.double, radius: cython.double, poses, words, lengths, tries):
+    def __init__(self, body: Body, radius: cython.double, poses, words, lengths, tries):
         """
         Args:
-            need: the clearance that the path keeps, and each curve that is put in [m].
+            body: what is free along the path, and must be along each curve that is put in.
             poses, words, lengths: of the path.
             tries: room is made for so many.
         """
-        self.clearance, self.need, self.radius = clearance, need, radius
+        self.body, self.radius = body, radius
         self.count = len(poses)
         # A change adds two poses at most; between two clearings they are all kept.
         room = self.count + 2 * tries + MOST_NEW
@@ -148,7 +147,7 @@ class Polisher:
         y += across * cos(theta)
         theta = remainder(theta + turn * size, TWO_PI)
         limit: cython.double = end - begin - LEAST_GAIN
-        if not self.clearance.free(x, y, self.need):
+        if not self.body.free(x, y, theta):
             return
         self.leave(begin)
         if not self.drive_to(x, y, theta, limit):
@@ -234,14 +233,14 @@ class Polisher:
     @cython.exceptval(check=False)
     def is_free(self, x: cython.double, y: cython.double, theta: cython.double, word: cython.int, first: cython.double,
                 second: cython.double, third: cython.double) -> cython.bint:
-        """Whether a curve keeps the clearance. Most that do not are blocked in the middle, so that is looked at first."""
+        """Whether a curve is free. Most that do not are blocked in the middle, so that is looked at first."""
         px: cython.double
         py: cython.double
         ptheta: cython.double
         px, py, ptheta = drive(x, y, theta, self.radius, turn_of(word, 0), first)
         px, py, ptheta = drive(px, py, ptheta, self.radius, turn_of(word, 1), second / 2)
-        return (self.clearance.free(px, py, self.need)
-                and self.clearance.curve_is_free(x, y, theta, self.radius, word, first, second, third, self.need))
+        return (self.body.free(px, py, ptheta)
+                and self.body.curve_is_free(x, y, theta, self.radius, word, first, second, third))
 
     @cython.cfunc
     @cython.nogil

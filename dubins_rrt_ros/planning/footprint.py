@@ -1,0 +1,118 @@
+"""A polygon footprint as the kernels need it: discs that cover it, and convex parts that can be made wider."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+Point = tuple[float, float]
+Outline = tuple[Point, ...]
+
+#: Each disc covers a piece; there are so many beside each other, and at most so many one after the other.
+PIECES_PER_WIDTH = 2
+MOST_PIECES_PER_LENGTH = 12
+#: At so many points on their rims the discs are compared with the footprint.
+RIM = 361
+
+
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """What covers a footprint, in the vehicle's frame.
+
+    Attributes:
+        discs: (m, 4) float64: x, y and radius of discs that cover it, and the radius of a disc there that it covers [m].
+        excess: how far the discs reach beyond the footprint, about [m].
+        corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and by how much they move per
+            metre that the part is made wider by, which is at most sqrt(2).
+        first_corner: (p + 1,) int32: where the corners of each part begin.
+    """
+
+    discs: np.ndarray
+    excess: float
+    corners: np.ndarray
+    first_corner: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def cover(outline: Outline) -> Cover:
+    """What covers a footprint whose corners (x, y), counter-clockwise, are `outline` [m]."""
+    polygon = shapely.Polygon(outline)
+    discs = np.array([_disc_around(piece, polygon) for piece in _pieces(polygon)])
+    parts = [_widened(part) for part in _convex_parts(outline)]
+    first_corner = np.cumsum([0, *map(len, parts)]).astype(np.int32)
+    return Cover(discs, float(shapely.distance(polygon, shapely.points(_rims(discs))).max()), np.concatenate(parts), first_corner)
+
+
+def _rims(discs: np.ndarray) -> np.ndarray:
+    """(m, RIM, 2) points on the rims of discs."""
+    bearing = np.linspace(0, math.tau, RIM)
+    return discs[:, None, :2] + discs[:, None, 2:3] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+
+
+def _pieces(polygon: shapely.Polygon) -> list[shapely.Geometry]:
+    """The footprint, cut into pieces that are about as long as wide."""
+    low, high = np.array(polygon.bounds).reshape(2, 2)
+    side = max((high - low).min() / PIECES_PER_WIDTH, (high - low).max() / MOST_PIECES_PER_LENGTH)
+    columns, rows = (np.linspace(a, b, math.ceil((b - a) / side - 1e-9) + 1) for a, b in zip(low, high, strict=True))
+    squares = (shapely.box(x0, y0, x1, y1) for x0, x1 in pairwise(columns) for y0, y1 in pairwise(rows))
+    return [piece for piece in map(polygon.intersection, squares) if piece.area > 0]
+
+
+def _disc_around(piece: shapely.Geometry, polygon: shapely.Polygon) -> tuple[float, float, float, float]:
+    """The smallest disc around a piece, and the radius of a disc with its centre that the polygon covers."""
+    centre = shapely.minimum_bounding_circle(piece).centroid
+    radius = max(math.dist((centre.x, centre.y), corner) for corner in shapely.get_coordinates(piece).tolist())
+    inner = shapely.distance(polygon.exterior, centre) if polygon.contains(centre) else 0.0
+    return centre.x, centre.y, radius * (1 + 1e-9), inner * (1 - 1e-9)
+
+
+def _convex_parts(outline: Outline) -> list[np.ndarray]:
+    """(k, 2) corners of convex parts that make up the footprint: itself, or triangles."""
+    corners = np.array(outline)
+    if _turns(corners).min() >= 0:
+        return [corners[_turns(corners) > 0]]
+    parts = []
+    while len(corners) > 3:
+        ear = _ear(corners)
+        parts.append(corners[[ear - 1, ear, (ear + 1) % len(corners)]])
+        corners = np.delete(corners, ear, axis=0)
+    return [part for part in [*parts, corners] if _turns(part).max() > 0]
+
+
+def _turns(corners: np.ndarray) -> np.ndarray:
+    """(k,) the sine of the turn at each corner, times the lengths of its edges."""
+    to, onward = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    return to[:, 0] * onward[:, 1] - to[:, 1] * onward[:, 0]
+
+
+def _ear(corners: np.ndarray) -> int:
+    """A corner that can be cut off: its triangle holds no other corner. There is one, as the outline does not touch itself."""
+    turns = _turns(corners)
+    flat = np.flatnonzero(turns == 0)
+    if len(flat):
+        return int(flat[0])
+    for ear in np.flatnonzero(turns > 0):
+        triangle = shapely.Polygon(corners[[ear - 1, ear, (ear + 1) % len(corners)]])
+        others = np.delete(corners, [ear - 1, ear, (ear + 1) % len(corners)], axis=0)
+        if not shapely.intersects_xy(triangle, others).any():
+            return int(ear)
+    return int(np.argmax(turns))  # only rounding can bring us here
+
+
+def _widened(corners: np.ndarray) -> np.ndarray:
+    """(2 k, 4): a convex part whose corners are cut off, so that made wider it stays within sqrt(2) of that.
+
+    Each corner becomes two: where the line along either edge and the one that cuts the corner off, each moved outwards by a
+    metre, meet. The edges have the unit normals n and m, the cut has u = (n + m) / |n + m|; the lines of n and u meet at
+    (n + u) / (1 + n u) from the corner.
+    """
+    edges = np.roll(corners, -1, axis=0) - corners
+    after = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)[:, None]
+    before = np.roll(after, 1, axis=0)
+    cut = before + after
+    cut /= np.hypot(*cut.T)[:, None]
+    moves = [(normal + cut) / (1 + (normal * cut).sum(axis=1))[:, None] for normal in (before, after)]
+    return np.stack([np.column_stack([corners, move]) for move in moves], axis=1).reshape(-1, 4)

@@ -1,0 +1,68 @@
+"""What covers a footprint: discs and convex parts that are together no less than it, and hardly more."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from cases import scaled
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from dubins_rrt_ros.planning import Vehicle
+from dubins_rrt_ros.planning.footprint import cover
+
+CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
+OUTLINES = {
+    "car": CAR, "clockwise": "[[3.6, -0.9], [-0.9, -0.9], [-0.9, 0.9], [3.6, 0.9]]",
+    "thin": "[[2, 0.01], [-2, 0.01], [-2, -0.01], [2, -0.01]]", "needle": "[[1.5, 0], [-0.5, 0.1], [-0.5, -0.1]]",
+    "L": "[[1, 1], [0.2, 1], [0.2, 0.2], [-1, 0.2], [-1, -0.3], [1, -0.3]]",
+    "star": "[[1, 0], [0.2, 0.2], [0, 1], [-0.2, 0.2], [-1, 0], [-0.2, -0.2], [0, -1], [0.2, -0.2]]",
+    "corners on an edge": "[[1, 0.5], [0.5, 0.5], [0, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]]",
+    "fork": "[[2, 1], [-0.2, 1], [-0.2, -1], [2, -1], [2, -0.8], [0.5, -0.8], [0.5, 0.8], [2, 0.8]]",
+}
+
+
+def check_cover(outline):
+    found, polygon = cover(outline), shapely.Polygon(outline)
+    discs = shapely.union_all([shapely.Point(x, y).buffer(r, 256) for x, y, r, _ in found.discs])
+    assert polygon.difference(discs.buffer(1e-4 * found.discs[:, 2].max())).area < 1e-12
+    farthest = shapely.distance(polygon, shapely.points(shapely.get_coordinates(discs))).max()
+    assert found.excess == pytest.approx(farthest, rel=0.01, abs=1e-3 * polygon.length)
+    for x, y, _, inner in found.discs:
+        assert inner < 1e-9 or polygon.buffer(1e-9).contains(shapely.Point(x, y).buffer(inner))
+    check_parts(found, polygon)
+
+
+def check_parts(found, polygon):
+    """Together the convex parts are the polygon; made wider they hold it made wider, and reach at most sqrt(2) as far."""
+    for wider in (0.0, 0.01, 1.0):
+        rings = [ring[:, :2] + wider * ring[:, 2:] for ring in np.split(found.corners, found.first_corner[1:-1])]
+        parts = shapely.union_all([shapely.convex_hull(shapely.MultiPoint(ring)) for ring in rings])
+        tolerance = 1e-9 + 1e-6 * wider
+        assert polygon.buffer(wider, 64).difference(parts.buffer(tolerance)).area < 1e-9
+        assert parts.difference(polygon.buffer(math.sqrt(2) * wider * 1.001 + tolerance, 64)).area < 1e-9
+        for ring in rings:
+            assert shapely.Polygon(ring).area == pytest.approx(shapely.convex_hull(shapely.MultiPoint(ring)).area, rel=1e-9)
+            assert shapely.LinearRing(ring).is_ccw
+
+
+@pytest.mark.parametrize("kind", OUTLINES)
+def test_a_footprint_is_covered(kind):
+    check_cover(Vehicle(footprint=OUTLINES[kind]).outline)
+
+
+@settings(max_examples=scaled(100, least=10))
+@given(st.lists(st.tuples(st.floats(0, math.tau), st.floats(0.05, 3)), min_size=3, max_size=9, unique_by=lambda polar: polar[0]))
+def test_any_footprint_is_covered(corners):
+    outline = [[r * math.cos(angle), r * math.sin(angle)] for angle, r in sorted(corners)]
+    polygon = shapely.Polygon(outline)
+    assume(polygon.is_valid and polygon.area > 1e-3 and polygon.contains(shapely.Point(0, 0)))
+    check_cover(Vehicle(footprint=str(outline)).outline)
+
+
+def test_a_car_is_covered_by_few_discs_tightly():
+    found = cover(Vehicle(footprint=CAR).outline)
+    assert len(found.discs) == 10
+    assert found.excess < 0.19
+    assert len(found.first_corner) == 2
