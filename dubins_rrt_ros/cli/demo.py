@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.share import maps_directory
 
 from .output import check_drawing, check_folder
@@ -91,7 +92,7 @@ def _report(answer: "Answer") -> None:
 
 def _draw(file: str, answer: "Answer") -> None:
     from .plots import Drawing, draw, figures_title, path_title  # here, for matplotlib is slow to import
-    figures = answer.figures
-    draw(file, Drawing(answer.map, START, GOAL, PARAMETERS["robot_radius"], answer.tree, answer.path,
+    figures, vehicle = answer.figures, Vehicle(PARAMETERS["turning_radius"], PARAMETERS["robot_radius"])
+    draw(file, Drawing(answer.map, START, GOAL, vehicle, answer.tree, answer.path,
                        path_title(PARAMETERS["planner"], figures["path_length"], figures["gap"]),
                        figures_title(int(figures["samples"]), figures["time_to_first"], figures["planning_time"])))

@@ -3,18 +3,20 @@
 import math
 import textwrap
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, PathPatch, Polygon
+from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 
-from dubins_rrt_ros.planning import GridMap, Map, Plan, PolygonMap
+from dubins_rrt_ros.planning import GridMap, Map, Plan, Vehicle
 from dubins_rrt_ros.planning.map import OCCUPIED_FROM
 
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
@@ -33,9 +35,9 @@ class Drawing(NamedTuple):
     Attributes:
         map: free and occupied space.
         start, goal: (x [m], y [m], theta [rad]).
-        robot_radius: of the disc that covers the vehicle [m].
+        vehicle: what drives.
         tree: (m, 2, 2) line segments of the tree's edges [m].
-        path: (n, 2) or (n, 3) points of the path [m], none where there is no path.
+        path: (n, 3) poses of the path, close together, none where there is no path.
         title: one sentence with what matters most.
         subtitle: the other figures.
         culprit: (x, y) of what keeps a path from being there [m], or None.
@@ -44,7 +46,7 @@ class Drawing(NamedTuple):
     map: Map
     start: Sequence[float]
     goal: Sequence[float]
-    robot_radius: float
+    vehicle: Vehicle
     tree: np.ndarray
     path: np.ndarray
     title: str
@@ -57,7 +59,7 @@ def draw_plan(file: str, plan: Plan) -> None:
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
     path = plan.path.poses(plan.settings.path_spacing) if plan.path else np.empty((0, 3))
     title, subtitle = _captions(plan)
-    draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle.robot_radius,
+    draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
                        plan.tree.segments(size / 400), path, title, subtitle, plan.culprit))
 
 
@@ -96,12 +98,14 @@ def draw(file: str, drawing: Drawing) -> None:
     # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
     axes.add_collection(LineCollection(drawing.tree, colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
     _draw_path(axes, drawing)
-    arrow = max(2.2 * drawing.robot_radius, 0.045 * (high - low).max())
-    _draw_pose(axes, drawing.start, START, drawing.robot_radius, arrow)
-    _draw_pose(axes, drawing.goal, GOAL, drawing.robot_radius, arrow)
+    reach = drawing.vehicle.robot_radius
+    arrow = max(2.2 * drawing.vehicle.inner_radius, 0.045 * (high - low).max())
+    _draw_pose(axes, drawing.start, START, drawing.vehicle, arrow)
+    _draw_pose(axes, drawing.goal, GOAL, drawing.vehicle, arrow)
     # Behind the start and ahead of the goal, where no path runs.
-    _draw_name(axes, "start", drawing.start, START, -max(1.3 * drawing.robot_radius, 0.3 * arrow))
-    _draw_name(axes, "goal", drawing.goal, GOAL, 1.1 * arrow)
+    beside = max(1.3 * drawing.vehicle.inner_radius, 0.3 * arrow)
+    _draw_name(axes, "start", drawing.start, START, -max(1.1 * reach, beside), beside)
+    _draw_name(axes, "goal", drawing.goal, GOAL, max(1.1 * arrow, 1.1 * reach), max(1.1 * arrow, beside))
     if drawing.culprit is not None:
         axes.plot(*drawing.culprit, "x", color=CULPRIT, markersize=12, markeredgewidth=3, zorder=6)
     figure.savefig(file, dpi=DPI)
@@ -135,7 +139,7 @@ def _draw_map(axes: Axes, map: Map) -> None:
     if isinstance(map, GridMap):
         _draw_grid(axes, map)
     else:
-        axes.add_patch(PathPatch(_outline(map), facecolor=FREE, edgecolor="none", zorder=1))
+        axes.add_patch(PathPatch(_outline(map.free), facecolor=FREE, edgecolor="none", zorder=1))
 
 
 def _draw_grid(axes: Axes, grid: GridMap) -> None:
@@ -148,48 +152,67 @@ def _draw_grid(axes: Axes, grid: GridMap) -> None:
     axes.axis(view)
 
 
-def _outline(polygons: PolygonMap) -> Outline:
+def _outline(polygons: shapely.Geometry) -> Outline:
     """The rings as one outline: shells counter-clockwise and holes clockwise, so that holes stay empty."""
     parts = []
-    for polygon in getattr(polygons.free, "geoms", [polygons.free]):
+    for polygon in shapely.get_parts(polygons):
         for ring, is_shell in ((polygon.exterior, True), *((hole, False) for hole in polygon.interiors)):
             points = np.asarray(ring.coords)[:, :2]
-            parts.append(Outline(points if ring.is_ccw == is_shell else points[::-1], closed=True))
-    return Outline.make_compound_path(*parts)
+            if len(points):
+                parts.append(Outline(points if ring.is_ccw == is_shell else points[::-1], closed=True))
+    return Outline.make_compound_path(*parts) if parts else Outline(np.empty((0, 2)))
 
 
 def _draw_path(axes: Axes, drawing: Drawing) -> None:
     if len(drawing.path) == 0:
         return
-    inch = MAP_SIDE / max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
     x, y = drawing.path[:, 0], drawing.path[:, 1]
-    swept = 72 * inch * 2 * drawing.robot_radius
-    axes.plot(x, y, color=PATH, alpha=0.18, linewidth=swept, solid_capstyle="round", solid_joinstyle="round", zorder=3)
+    swept = _outline(_swept(drawing.vehicle, drawing.path))
+    axes.add_patch(PathPatch(swept, facecolor=PATH, alpha=0.18, edgecolor="none", zorder=3))
     axes.plot(x, y, color=PATH, linewidth=2.4, solid_capstyle="round", solid_joinstyle="round", zorder=4)
 
 
-def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, radius: float, length: float) -> None:
-    """The vehicle's disc and an arrow along its heading."""
+def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
+    """What the vehicle covers along a path, with straight lines from pose to pose."""
+    if not vehicle.outline:
+        line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
+        return line.buffer(vehicle.robot_radius)
+    bodies = [_body(vehicle, pose) for pose in path]
+    return shapely.union_all([shapely.union(*pair).convex_hull for pair in pairwise(bodies)] or bodies)
+
+
+def _body(vehicle: Vehicle, pose: Sequence[float]) -> shapely.Polygon:
+    """What the vehicle covers at a pose."""
     x, y, theta = pose
-    axes.add_patch(Circle((x, y), radius, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
-    axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
+    if not vehicle.outline:
+        return shapely.Point(x, y).buffer(vehicle.robot_radius)
+    return shapely.Polygon(Affine2D().rotate(theta).translate(x, y).transform(vehicle.outline))
+
+
+def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:
+    """The vehicle and an arrow along its heading."""
+    x, y, theta = pose
+    body = _outline(_body(vehicle, pose))
+    axes.add_patch(PathPatch(body, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
+    axes.add_patch(PathPatch(body, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
     outline = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
     place = Affine2D().rotate(theta).translate(x, y)
     axes.add_patch(Polygon(place.transform(outline), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))
 
 
-def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead: float) -> None:
-    """A name at a distance ahead of a pose, or behind it, and clear of it."""
+def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead: float, beside: float) -> None:
+    """A name at a distance ahead of a pose, or behind it, and clear of it; or else at another beside it."""
     x, y, theta = pose
     dx, dy = ahead * math.cos(theta), ahead * math.sin(theta)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     if not (left < x + 2.5 * dx < right and low < y + 2.5 * dy < high):
         # It would run over the frame: beside the pose, then, on the side of the map's middle.
-        dx, dy = -dy, dx
+        dx, dy = (beside / abs(ahead) * length for length in (-dy, dx))
         if dx * (left + right - 2 * x) + dy * (low + high - 2 * y) < 0:
             dx, dy = -dx, -dy
-    aside = {-1: "right", 0: "center", 1: "left"}[round(dx / abs(ahead))]
-    above = {-1: "top", 0: "center", 1: "bottom"}[round(dy / abs(ahead))]
+    away = math.hypot(dx, dy)
+    aside = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
+    above = {-1: "top", 0: "center", 1: "bottom"}[round(dy / away)]
     halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
     axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=aside, va=above, path_effects=halo,
               zorder=7)
