@@ -56,9 +56,10 @@ def before_search(problem: Problem, field: ClearanceField) -> Reason | None:
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
             ("Goal", problem.goal, problem.goal_tolerance_xy, Status.GOAL_OUTSIDE_MAP, Status.GOAL_OCCUPIED)):
-        if has_no_room(field, problem.vehicle.inner_radius + MARGIN, pose[:2], tolerance):
-            nearest = nearest_in_map(problem.map, pose[:2])
-            if math.dist(pose[:2], nearest) > ROUNDING:
+        nearest = nearest_in_map(problem.map, pose[:2])
+        away = math.dist(pose[:2], nearest)
+        if away > tolerance + ROUNDING or has_no_room(field, problem.vehicle.inner_radius + MARGIN, pose[:2], tolerance):
+            if away > ROUNDING:
                 return Reason(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
             return Reason(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
         is_one_pose = pose is problem.start or problem.exact_goal

@@ -8,14 +8,14 @@ import shapely
 from matplotlib.image import imread
 
 from dubins_rrt_ros.cli import plots
-from dubins_rrt_ros.planning import GridMap, PolygonMap
+from dubins_rrt_ros.planning import GridMap, PolygonMap, Vehicle
 
 L_SHAPE = np.array([[1.0, 1.0], [11.0, 1.0], [11.0, 6.0]])
 NO_TREE, NO_PATH = np.empty((0, 2, 2)), np.empty((0, 3))
 
 
-def drawing(map, *, tree=NO_TREE, path=NO_PATH, start=(1.0, 1.0, 0.0), goal=(11.0, 6.0, math.pi / 2)):
-    return plots.Drawing(map, start, goal, 0.2, tree, path, "RRT*: 15.00 m", "3000 samples")
+def drawing(map, *, tree=NO_TREE, path=NO_PATH, start=(1.0, 1.0, 0.0), goal=(11.0, 6.0, math.pi / 2), vehicle=None):
+    return plots.Drawing(map, start, goal, vehicle or Vehicle(robot_radius=0.2), tree, path, "RRT*: 15.00 m", "3000 samples")
 
 
 class Picture:
@@ -74,6 +74,26 @@ def test_the_swept_disc_has_the_vehicles_width(tmp_path, room):
     picture = Picture(tmp_path / "band.png", drawing(room, path=L_SHAPE))
     assert picture.at(6, 1.17) != plots.FREE and picture.at(6, 0.83) != plots.FREE
     assert picture.at(6, 1.23) == picture.at(6, 0.77) == plots.FREE
+
+
+def test_a_footprint_is_drawn_with_all_that_it_sweeps(tmp_path, room):
+    """Straight on it is 0.8 m wide; turning on, the corner ahead swings out."""
+    vehicle = Vehicle(turning_radius=2.0, footprint="[[2, 0.4], [-0.4, 0.4], [-0.4, -0.4], [2, -0.4]]")
+    turn = np.linspace(0, math.pi / 2, 40)
+    arc = np.column_stack([6 + 2 * np.sin(turn), 2.9 - 2 * np.cos(turn), turn])
+    path = np.vstack([[2.0, 0.9, 0.0], arc])
+    picture = Picture(tmp_path / "swept.png", drawing(room, path=path, start=path[0], goal=(2.0, 7.0, math.pi), vehicle=vehicle))
+    assert picture.at(4.5, 1.25) != plots.FREE and picture.at(4.5, 1.35) == plots.FREE
+    corner = np.array([6, 2.9]) + math.hypot(2, 2.4) * np.array([math.cos(-math.pi / 8), math.sin(-math.pi / 8)])
+    outwards = (corner - [6, 2.9]) / math.hypot(*(corner - [6, 2.9]))
+    assert picture.at(*(corner - 0.05 * outwards)) != plots.FREE
+    assert picture.at(*(corner + 0.05 * outwards)) == plots.FREE
+    assert picture.at(0.5, 7.3) != plots.FREE and picture.at(2.3, 7.3) != plots.FREE and picture.at(2.5, 7.3) == plots.FREE
+
+
+def test_a_point_is_drawn_too(tmp_path, room):
+    picture = Picture(tmp_path / "point.png", drawing(room, path=L_SHAPE, vehicle=Vehicle(robot_radius=0.0)))
+    assert picture.at(6, 1) == plots.PATH and picture.at(6, 1.08) == plots.FREE
 
 
 def test_without_a_path_none_is_drawn(tmp_path, room):

@@ -329,6 +329,48 @@ def test_a_free_start_and_goal_are_not_blamed():
     assert "allow more time, or loosen the goal's tolerance" in late.message
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+def test_a_goal_beyond_all_measure(tolerance):
+    goal = (1e300, 0.0, 0.0)
+    result = why(Problem(walls_with_a_gap(slice(0, 40)), Vehicle(0.5, 0.0), START, goal, goal_tolerance_xy=tolerance))
+    assert result.status == Status.GOAL_OUTSIDE_MAP
+    assert "1e+300 m outside the map" in result.message
+
+
+FOOTPRINT = "[[0.6, 0.3], [-0.6, 0.3], [-0.6, -0.3], [0.6, -0.3]]"
+
+
+@pytest.mark.parametrize("turned, status", [(0.0, Status.START_OCCUPIED), (math.pi / 2, None)])
+def test_a_footprint_that_touches_is_told_where(turned, status):
+    """Lengthwise it fits between the wall and the map's edge, across it does not."""
+    map = PolygonMap(shapely.box(0, 0, 10, 10) - shapely.box(1, 2, 1.2, 8))
+    problem = Problem(map, Vehicle(0.5, footprint=FOOTPRINT), (0.5, 5.0, turned), (8.0, 5.0, 0.0))
+    result = plan(problem, Settings(samples=50, seed=1))
+    assert result.status == (status or result.status)
+    assert (result.status == Status.START_OCCUPIED) == (status is not None)
+    if status:
+        assert result.message.startswith("Start is occupied: the footprint touches ")
+        assert result.message.endswith("; move or turn it, or make footprint smaller if the robot is.")
+        assert result.culprit[0] in (pytest.approx(0.0), pytest.approx(1.0))
+
+
+def test_unknown_space_under_a_footprint_is_told():
+    data = np.zeros((40, 40))
+    data[19:21, 25] = -1
+    problem = Problem(GridMap(data, 0.1), Vehicle(0.5, footprint=FOOTPRINT), (2.0, 2.0, 0.0), (2.0, 3.0, 0.0))
+    result = why(problem)
+    assert result.status == Status.START_OCCUPIED
+    assert re.fullmatch(r"Start is occupied: the footprint touches unknown space at \(2\.5\d, [12]\.\d\d\): "
+                        r"drive there to map it, or set allow_unknown\.", result.message)
+
+
+def test_a_way_too_narrow_for_a_footprint_is_told():
+    problem = Problem(walls_with_a_gap(slice(20, 21)), Vehicle(0.5, footprint=FOOTPRINT), START, GOAL)
+    result = why(problem)
+    assert "the widest way found between start and goal is 0.50 m wide at (" in result.message
+    assert "a footprint that is 0.6 m wide or more everywhere around its reference point does not fit; " in result.message
+
+
 def test_start_and_goal_that_nearly_coincide():
     problem = Problem(walls_with_a_gap(slice(0, 0)), Vehicle(8.0, 0.3), (-5.0, 0.0, 0.0), (-5.0, 0.01, 0.0))
     assert "the goal is so close to the start" in why(problem).message
