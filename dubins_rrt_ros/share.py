@@ -7,6 +7,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from .planning.map import MapNotFound
+from .planning.map_files import expand_home
 
 PACKAGE = "dubins_rrt_ros"
 _URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<host>[^/]*)/?(?P<path>.*)", re.DOTALL)
@@ -59,7 +60,7 @@ def _choices() -> str:
 
 def _places(name: str) -> list[Path]:
     """Where the map of a name that is no URL may be."""
-    path, own = Path(os.path.expanduser(name)), maps_directory()
+    path, own = expand_home(name), maps_directory()
     is_own = path.parent in (Path("."), Path("maps"))
     return [path, own / path.name, own / f"{path.name}.yaml"] if is_own else [path]
 

@@ -1,12 +1,14 @@
 """The problems that `dubins_rrt bench` measures on, from its file."""
 
 import json
+import os
 from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Vehicle, checked_pose
+from dubins_rrt_ros.planning.wording import one_line, quoted
 
 from .flags import UsageError
 
@@ -42,7 +44,7 @@ def read_cases(file: str) -> list[Case]:
     cases = [_case(entry, Path(file).parent, f"{file}: problem {number}") for number, entry in enumerate(entries, 1)]
     twice = [name for name, count in Counter(case.name for case in cases).items() if count > 1]
     if twice:
-        raise UsageError(f"{file}: several problems have the name {twice[0]}; give each its own")
+        raise UsageError(one_line(f"{file}: several problems have the name {twice[0]}; give each its own"))
     return cases
 
 
@@ -92,19 +94,19 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
         raise UsageError(f"{where} lacks {', '.join(missing)}")
     for key in ("name", "map"):
         if not (isinstance(entry[key], str) and entry[key]):
-            raise UsageError(f"{where}: its {key} is {entry[key]!r}; give a text")
+            raise UsageError(f"{where}: its {key} is {quoted(entry[key])}; give a text")
     where, map = f"{where}, {entry['name']}", folder / entry["map"]
-    if not map.is_file():
-        raise UsageError(f"{where}: there is no map file {map}")
+    if not os.path.isfile(map):  # pathlib's is_file() raises for a name that is too long
+        raise UsageError(one_line(f"{where}: there is no map file {map}"))
     try:
         vehicle = Vehicle(turning_radius=entry["turning_radius"], robot_radius=entry["robot_radius"])
         return Case(entry["name"], map, vehicle, *(_pose(key, entry[key]) for key in ("start", "goal")))
     except (OptionError, InvalidPose) as error:
-        raise UsageError(f"{where}: {error}") from error
+        raise UsageError(one_line(f"{where}: {error}")) from error
 
 
 def _pose(name: str, numbers: Any) -> Pose:
     """A pose of numbers, not of texts that could be read as such."""
     if not (isinstance(numbers, list) and all(type(number) in (int, float) for number in numbers)):
-        raise InvalidPose(f"The {name} pose is {numbers!r}; give three numbers: [x [m], y [m], yaw [rad]].")
+        raise InvalidPose(f"The {name} pose is {quoted(numbers)}; give three numbers: [x [m], y [m], yaw [rad]].")
     return checked_pose(name, numbers)

@@ -1,6 +1,7 @@
 """Where the command line gets its requests from: map files, and plans to be planned again."""
 
 import json
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -60,7 +61,7 @@ def _read_json(file: str) -> dict[str, Any]:
         document = json.loads(Path(file).read_text(encoding="utf-8"))
     except OSError as error:
         raise PlanFileError(f"{file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise PlanFileError(f"{file} is no JSON file: {error}") from error
     if not (isinstance(document, dict) and all(isinstance(document.get(name), str) for name in ("map", "map_id"))):
         raise PlanFileError(f"{file} names no map; give a file that `dubins_rrt plan --json` wrote")
@@ -83,7 +84,7 @@ def _candidates(file: str, name: str) -> Iterator[Path]:
     """Where the map of a document may be: as it was named then, beside the document, among the installed maps."""
     base, beside, own = Path(name).name, Path(file).parent, maps_directory()
     places = (*_named(name), beside / name, beside / base, own / base, own / f"{base}.yaml")
-    return (place for place in dict.fromkeys(places) if place.is_file())
+    return (place for place in dict.fromkeys(places) if os.path.isfile(place))
 
 
 def _named(name: str) -> list[Path]:

@@ -164,7 +164,9 @@ def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
     if isinstance(loaded, GridMap):
         return loaded
     width, height = np.ptp(loaded.corners(), axis=0)
-    return rasterise(loaded, max(RASTER_RESOLUTION, math.sqrt(width * height / RASTER_CELLS)))
+    # The last is for long and thin ones, whose ring of cells around counts.
+    return rasterise(loaded, max(RASTER_RESOLUTION, math.sqrt(width * height / RASTER_CELLS),
+                                 6 * max(width, height) / RASTER_CELLS))
 
 
 def status_message(node: str, status: Status, message: str, *, plan_id: int = 0, revision: int = 0,

@@ -40,7 +40,7 @@ class Preparation:
     """What plan() needs of a map, for one vehicle.
 
     Attributes:
-        map, robot_radius, allow_unknown: what it is for.
+        map, inner_radius, allow_unknown: what it is for.
         previous: a map that was prepared before, from which what did not change is taken over; None once it is computed, so
             that it is not kept alive any longer.
         done: set when it is computed.
@@ -48,7 +48,7 @@ class Preparation:
     """
 
     map: Map
-    robot_radius: float
+    inner_radius: float
     allow_unknown: bool
     previous: Map | None
     done: threading.Event
@@ -112,9 +112,9 @@ class Maps:
     def prepared(self) -> Preparation:
         """The preparation of the current map for the present vehicle, begun if it was not."""
         now = self._parameters.read()
-        wanted = self.current.map, now.vehicle.robot_radius, now.problem["allow_unknown"]
+        wanted = self.current.map, now.vehicle.inner_radius, now.problem["allow_unknown"]
         last = self._preparation
-        if last is None or (last.map, last.robot_radius, last.allow_unknown) != wanted:
+        if last is None or (last.map, last.inner_radius, last.allow_unknown) != wanted:
             self._preparation = Preparation(*wanted, _prepared_before(last), threading.Event())
             self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
         return self._preparation
@@ -122,7 +122,7 @@ class Maps:
     def _load_first(self, name: str) -> tuple[Map, GridMap]:
         """Load the map that the node begins with; a signal ends the wait for it."""
         loaded: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.worker.submit(lambda cancelled: self._load(name), loaded.put)
+        self.worker.submit(lambda cancelled: self._load(name, ""), loaded.put)
         while (outcome := _within(LOADING_INTERVAL, loaded)) is None:
             if not self._node.context.ok():
                 raise ExternalShutdownException
@@ -131,8 +131,9 @@ class Maps:
             raise outcome
         return outcome
 
-    def _load(self, name: str) -> tuple[Map, GridMap]:
-        loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells)
+    def _load(self, name: str, directory: str) -> tuple[Map, GridMap]:
+        """Load a map by its name, from within a directory; "" is any."""
+        loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells, map_directory=directory)
         return loaded, as_grid(loaded)
 
     def _on_map(self, message: OccupancyGrid) -> None:
@@ -181,7 +182,8 @@ class Maps:
 
     async def _on_load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
         loaded = Future()
-        self.worker.submit(lambda cancelled: self._load(request.map_url), partial(self._post, loaded.set_result))
+        directory = self._options.map_directory
+        self.worker.submit(lambda cancelled: self._load(request.map_url, directory), partial(self._post, loaded.set_result))
         outcome = await loaded
         response.result = _result(outcome)
         if response.result == LoadMap.Response.RESULT_SUCCESS:

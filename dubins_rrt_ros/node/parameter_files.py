@@ -1,7 +1,7 @@
 """Files that set the node's parameters: one with all of them, and those that are passed over in silence."""
 
 import json
-import re
+import os
 import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -11,11 +11,15 @@ from typing import Any
 import yaml
 
 from dubins_rrt_ros.planning import options
+from dubins_rrt_ros.planning.plain_yaml import load_plain
+from dubins_rrt_ros.planning.wording import one_line
 
 from .parameters import CLASSES, READ_ONLY, read_only
 
 #: The columns of a parameter file that is written.
 WIDTH = 100
+#: The longest file that is looked at [bytes]; PyYAML may take three seconds for as much.
+MAX_BYTES = 64 * 2**10
 
 
 def as_yaml() -> str:
@@ -43,7 +47,7 @@ def unused_files(arguments: Sequence[str], node_name: str) -> list[str]:
         names = _named_nodes(file)
         if names is not None and not any(_is_for(name, node_name) for name in names):
             found = f"names {', '.join(names)}" if names else "has no ros__parameters"
-            warnings.append(f"Parameter file {file!r} is ignored, as it {found}; name {node_name} or /** in it")
+            warnings.append(one_line(f"Parameter file {file!r} is ignored, as it {found}; name {node_name} or /** in it"))
     return warnings
 
 
@@ -65,8 +69,11 @@ def _parameter_files(arguments: Sequence[str]) -> Iterator[str]:
 def _named_nodes(file: str) -> list[str] | None:
     """The nodes that a parameter file has a section for, by their full names or wildcards; None where it cannot be read."""
     try:
-        return list(_sections(yaml.load(Path(file).read_text("utf-8"), Loader=yaml.BaseLoader)))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        # A pipe, which ROS has read by now, would wait for more.
+        if not os.path.isfile(file) or os.path.getsize(file) > MAX_BYTES:
+            return None
+        return list(_sections(load_plain(Path(file).read_text("utf-8"), aliases=False)))  # ROS takes none either
+    except (OSError, ValueError, RecursionError, OverflowError, yaml.YAMLError):
         return None
 
 
@@ -80,6 +87,11 @@ def _sections(tree: Any, name: str = "") -> Iterator[str]:
 
 def _is_for(section: str, node_name: str) -> bool:
     """Whether a section applies to a node, as rcl and rclpy see it: `*` is any one name, `**` any number of them."""
-    wildcards = {"*": r"/\w+", "**": r"(/\w+)*"}
-    pattern = "".join(wildcards.get(part, f"/{re.escape(part)}") for part in section.split("/")[1:])
-    return re.fullmatch(pattern, node_name) is not None
+    names = node_name.split("/")[1:]
+    matched = {0}  # how many of the names the parts so far can stand for
+    for part in section.split("/")[1:]:
+        if part == "**" and matched:
+            matched = set(range(min(matched), len(names) + 1))
+        else:
+            matched = {count + 1 for count in matched if count < len(names) and part in ("*", names[count])}
+    return len(names) in matched

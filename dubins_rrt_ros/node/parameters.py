@@ -20,12 +20,16 @@ class NodeOptions:
     """
 
     map_file: str = option("", "a map file, its URL, or the name of an installed map; empty: the map comes by topic")
+    map_directory: str = option("", "the directory that load_map may read from, with its subdirectories, once links are "
+                                    "followed; map_file may be elsewhere; empty: any")
     global_frame: str = option("map", "the frame of map, poses and path")
     map_transient_local: bool = option(True, "the map topic's publisher is transient local, as map_server's is")
     max_map_cells: int = option(100_000_000, "the largest map that is taken", unit="cells", low=1, high=2**31 - 1)
     publish_tree: bool = option(True, "show the tree on ~/tree while somebody subscribes")
     replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
                                                "is no longer free")
+    check_invariants: bool = option(False, "for debugging: check the invariants of every answer, its path and its tree before "
+                                           "it is published, which is slow")
 
     def __post_init__(self):
         convert_options(self)
@@ -47,8 +51,9 @@ class Configuration:
 CLASSES = {NodeOptions: "The node", Vehicle: "The vehicle", Problem: "The request", Settings: "The planner"}
 OPTIONS: dict[str, Option] = {item.name: item for cls in CLASSES for item in options(cls)}
 _RESTART = "start the node again with another value"
-#: They shape topics and are read once, as a change at run time would have no effect; and what to do instead.
-READ_ONLY = {"map_file": f"load another map by ~/load_map, or {_RESTART}", "global_frame": _RESTART,
+#: They shape topics and are read once, as a change at run time would have no effect, or limit what anyone on the network may
+#: do, a change of parameters included; and what to do instead.
+READ_ONLY = {"map_file": f"load another map by ~/load_map, or {_RESTART}", "map_directory": _RESTART, "global_frame": _RESTART,
              "map_transient_local": _RESTART}
 
 

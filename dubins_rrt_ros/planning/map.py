@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 import shapely
 
+from dubins_rrt_ros.planning.wording import one_line
+
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 #: Cell values up to the first are free, from the second on occupied, others unknown: map_server's default thresholds,
 #: 0.25 and 0.65, on the scale of nav_msgs/OccupancyGrid.
@@ -22,8 +24,7 @@ class MapError(ValueError):
     """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
 
     def __init__(self, message: str):
-        line = " ".join(message.split())
-        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line))
+        super().__init__(one_line(message))
 
 
 class MapNotFound(MapError):

@@ -2,7 +2,6 @@
 
 import math
 import os
-import reprlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,10 +23,14 @@ from dubins_rrt_ros.planning.map import (
 )
 from dubins_rrt_ros.planning.map_images import read_image
 from dubins_rrt_ros.planning.map_polygons import parse_geojson, parse_wkt
+from dubins_rrt_ros.planning.plain_yaml import load_plain
+from dubins_rrt_ros.planning.wording import quoted
 
 #: The longest files that are read [bytes]; an image is limited by its cells.
-MAX_YAML_BYTES = 2**20
+MAX_YAML_BYTES = 16 * 2**10
 MAX_POLYGON_BYTES = 64 * 2**20
+#: How long polygon files may be however few cells a map may have, and how much longer for each: as much as a position takes.
+_FEW_POLYGON_BYTES, _POLYGON_BYTES_PER_CELL = 64 * 2**10, 32
 
 MODES = ("trinary", "scale", "raw")
 _FLAGS = {**dict.fromkeys(("0", "false", "no", "off"), False), **dict.fromkeys(("1", "true", "yes", "on"), True)}
@@ -36,7 +39,7 @@ _FREE_GREY, _OCCUPIED_GREY, _UNKNOWN_GREY = 254, 0, 205
 _SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
 
 
-def load_map(path: str | os.PathLike, *, max_map_cells: int = 100_000_000) -> GridMap | PolygonMap:
+def load_map(path: str | os.PathLike, *, max_map_cells: int = 100_000_000, map_directory: str = "") -> GridMap | PolygonMap:
     """Load a map file; its ending says what it is.
 
     `.yaml`, `.yml`: map_server's format, by the rules of ROS 2 Jazzy. `.geojson`, `.json`: see
@@ -44,19 +47,21 @@ def load_map(path: str | os.PathLike, *, max_map_cells: int = 100_000_000) -> Gr
 
     Args:
         path: the file; a leading `~` is the home directory.
-        max_map_cells: the most cells of a grid; judged before its image is read.
+        max_map_cells: the most cells of a grid; judged before its image is read. Of polygons, 64 KiB and 32 bytes for each
+            cell may be read, and 64 MiB at most.
+        map_directory: the directory in which the file must be, and the image that it names, when links are followed; "" is any.
 
     Returns:
         A map in metres; its name is the file's.
 
     Raises:
-        MapNotFound: the file, or the image that it names, is not there or cannot be opened.
+        MapNotFound: the file, or the image that it names, is not there, cannot be opened or is outside `map_directory`.
         MapMetadataError: the YAML file is none, or a field in it is missing or wrong.
         MapError: anything else in the files cannot be used. The message names file, field, value and remedy.
     """
-    path = Path(os.path.expanduser(path))
+    path = expand_home(path)
     try:
-        return _load(path, max_map_cells)
+        return _load(path, max_map_cells, map_directory)
     except MapError as error:
         raise _located(path, error) from None
 
@@ -93,15 +98,34 @@ def _located(path: Path, error: MapError) -> MapError:
     return type(error)(f"{path}: {error}")
 
 
-def _load(path: Path, max_map_cells: int) -> GridMap | PolygonMap:
-    ending = path.suffix.lower()
+def expand_home(path: str | os.PathLike) -> Path:
+    """A path, its leading `~` replaced by the home directory."""
+    try:
+        return Path(os.path.expanduser(path))
+    except ValueError:  # a home directory of nobody that there can be
+        return Path(path)
+
+
+def _load(path: Path, max_map_cells: int, directory: str) -> GridMap | PolygonMap:
+    _check_inside(path, directory)
+    ending, longest = path.suffix.lower(), min(MAX_POLYGON_BYTES, _FEW_POLYGON_BYTES + _POLYGON_BYTES_PER_CELL * max_map_cells)
     if ending in (".yaml", ".yml"):
-        return _load_grid(path, max_map_cells)
+        return _load_grid(path, max_map_cells, directory)
     if ending in (".geojson", ".json"):
-        return parse_geojson(_read_text(path, MAX_POLYGON_BYTES), path.name)
+        return parse_geojson(_read_text(path, longest), path.name)
     if ending == ".wkt":
-        return parse_wkt(_read_text(path, MAX_POLYGON_BYTES), path.name)
+        return parse_wkt(_read_text(path, longest), path.name)
     raise MapError(f"the ending {ending!r} is of no known kind of map; give a .yaml, .geojson or .wkt file")
+
+
+def _check_inside(path: Path, directory: str) -> None:
+    """Refuse a file that is not in a directory, once all links are followed; "" is any."""
+    try:
+        is_inside = not directory or Path(os.path.realpath(path)).is_relative_to(os.path.realpath(expand_home(directory)))
+    except ValueError:  # one of them is no possible name
+        is_inside = False
+    if not is_inside:
+        raise MapNotFound(f"is outside of map_directory = {directory}; name a file in there, or set another directory")
 
 
 def _open(path: Path) -> BinaryIO:
@@ -121,7 +145,7 @@ def _read_text(path: Path, max_bytes: int, refusal: type[MapError] = MapError) -
     with _open(path) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:
-        raise refusal(f"is larger than {max_bytes} bytes; split or simplify the map")
+        raise refusal(f"is larger than {max_bytes} bytes; split or simplify it")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -131,7 +155,7 @@ def _read_text(path: Path, max_bytes: int, refusal: type[MapError] = MapError) -
     return text
 
 
-def _load_grid(path: Path, max_map_cells: int) -> GridMap:
+def _load_grid(path: Path, max_map_cells: int, directory: str) -> GridMap:
     fields = _parse_yaml(_read_text(path, MAX_YAML_BYTES, MapMetadataError))
     image = _field(fields, "image", _text, "give the name of a PGM, PNG or BMP file")
     resolution = _field(fields, "resolution", _positive, "give the side of a cell in metres, above 0")
@@ -143,6 +167,7 @@ def _load_grid(path: Path, max_map_cells: int) -> GridMap:
     if free >= occupied:
         raise MapMetadataError(f"free_thresh is {free} and occupied_thresh {occupied}; make free_thresh the smaller one")
     try:
+        _check_inside(path.parent / image, directory)
         with _open(path.parent / image) as file:
             grey, transparent = read_image(file, max_map_cells)
     except MapError as error:
@@ -155,16 +180,14 @@ def _load_grid(path: Path, max_map_cells: int) -> GridMap:
 
 
 def _parse_yaml(text: str) -> dict[str, Any]:
-    # BaseLoader leaves every scalar as text, as map_server's parser does: YAML 1.1 would make 1e-2 text, 010 eight, an
-    # image named 2024 a number, and a mode named off a boolean. Like SafeLoader it constructs no objects.
     try:
-        document = yaml.load(text, Loader=yaml.BaseLoader)
+        document = load_plain(text, aliases=True)  # as map_server's parser does it
     except RecursionError:
         raise MapMetadataError("YAML is nested too deep; give the fields of a map_server map") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise MapMetadataError(f"is no valid YAML ({error}); correct the text") from None
     if not isinstance(document, dict):
-        raise MapMetadataError(f"YAML is {reprlib.repr(document)}; give the fields of a map_server map")
+        raise MapMetadataError(f"YAML is {quoted(document)}; give the fields of a map_server map")
     return document
 
 
@@ -174,7 +197,7 @@ def _field(fields: dict[str, Any], name: str, convert: Callable[[Any], Any], rem
     try:
         return convert(fields[name])
     except (ValueError, TypeError, LookupError, AttributeError):
-        raise MapMetadataError(f"{name} is {reprlib.repr(fields[name])}; {remedy}") from None
+        raise MapMetadataError(f"{name} is {quoted(fields[name])}; {remedy}") from None
 
 
 def _text(value: Any) -> str:

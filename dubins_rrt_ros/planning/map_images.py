@@ -12,10 +12,12 @@ from PIL import BmpImagePlugin, Image, PngImagePlugin
 
 from dubins_rrt_ros.planning.map import MapError
 
-#: The longest plain (P2) PGM that is read [bytes].
-MAX_PLAIN_PGM_BYTES = 64 * 2**20
+#: The longest plain (P2) PGM that is read, and how much each pixel may take of it, beyond the longest header [bytes].
+MAX_PLAIN_PGM_BYTES, PLAIN_PGM_BYTES_PER_PIXEL = 64 * 2**20, 16
 #: The longest PGM header, with its comments, that is read [bytes].
 MAX_PGM_HEADER_BYTES = 64 * 2**10
+#: What the chunks of a PNG may take beyond twice the bytes of its pixels [bytes].
+PNG_SLACK = 2**20
 
 _GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
 _PGM_HEADER = re.compile(rb"P([25])" + 3 * (_GAP + rb"+(\d{1,9})") + _GAP)
@@ -24,6 +26,9 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 #: The chunks that say what the pixels are. Pillow gets no others, as it warns of and fails for some that do not matter.
 _PNG_CHUNKS = (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND")
+_BMP_START = struct.Struct("<14xI12xI")
+#: The header that tells of no compression, the longest there is [bytes], and the compressions that are none.
+_BMP_SHORT_HEADER, _BMP_LONGEST_HEADER, _BMP_PLAIN = 12, 124, (0, 3)
 #: First column, first row and the steps from there, for each pass of an interlaced PNG.
 _PNG_PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 #: What Pillow raises for damaged files.
@@ -55,7 +60,7 @@ def read_image(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray |
     if magic == _PNG_SIGNATURE:
         return _read_png(file, max_cells)
     if magic.startswith(b"BM"):
-        return _read_with_pillow(BmpImagePlugin.BmpImageFile, file, max_cells, 8)
+        return _read_bmp(file, max_cells)
     raise MapError("is no PGM (P2, P5), PNG or BMP; convert it to one of them")
 
 
@@ -93,9 +98,10 @@ def _read_binary(file: BinaryIO, count: int, maxval: int) -> np.ndarray:
 
 
 def _read_plain(file: BinaryIO, count: int) -> np.ndarray:
-    text = file.read(MAX_PLAIN_PGM_BYTES + 1)
-    if len(text) > MAX_PLAIN_PGM_BYTES:
-        raise MapError(f"is a plain PGM of more than {MAX_PLAIN_PGM_BYTES} bytes; save it as binary PGM (P5) or PNG")
+    longest = min(MAX_PLAIN_PGM_BYTES, MAX_PGM_HEADER_BYTES + PLAIN_PGM_BYTES_PER_PIXEL * count)
+    text = file.read(longest + 1)
+    if len(text) > longest:
+        raise MapError(f"is a plain PGM of more than {longest} bytes for {count} pixels; save it as binary PGM (P5) or PNG")
     text = re.sub(rb"#[^\r\n]*", b"", text)
     if not re.fullmatch(rb"[\d\s]*", text):
         raise MapError("is a plain PGM (P2) with something other than numbers among its pixels; save the image again")
@@ -113,9 +119,11 @@ def _read_png(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | 
         raise _damaged("it has no header")
     width, height, depth, colour, _, _, interlaced = _PNG_START.unpack(start)[3:]
     _check_size(width, height, max_cells)
-    chunks = list(_png_chunks(file))
-    # Pillow would make missing rows black.
     needed = _png_bytes(width, height, depth * _PNG_CHANNELS.get(colour, 1), interlaced)
+    chunks = list(_png_chunks(file, 2 * needed + PNG_SLACK))
+    if sum(chunk[4:8] == b"IHDR" for chunk in chunks) > 1:
+        raise _damaged("it has several headers")
+    # Pillow would make missing rows black.
     found = _inflated_bytes((chunk[8:-4] for chunk in chunks if chunk[4:8] == b"IDAT"), needed)
     if found < needed:
         raise _damaged(f"it has {found} of {needed} bytes of pixels")
@@ -127,16 +135,22 @@ def _damaged(reason: object) -> MapError:
     return MapError(f"is damaged ({reason}); copy or save it again")
 
 
-def _png_chunks(file: BinaryIO) -> Iterator[bytes]:
-    """The chunks about pixels, whole, after a check of their checksums, which Pillow omits for the pixels."""
+def _png_chunks(file: BinaryIO, most: int) -> Iterator[bytes]:
+    """The chunks about pixels, whole, after a check of their checksums, which Pillow omits for the pixels.
+
+    They may take `most` bytes, with 12 for each of the others.
+    """
     end = file.seek(0, io.SEEK_END)
     at, kind = len(_PNG_SIGNATURE), b""
     while kind != b"IEND":
         file.seek(at)
         length, kind = struct.unpack(">I4s", file.read(8).ljust(8, b"\0"))
         at += 12 + length
+        most -= 12 + (length if kind in _PNG_CHUNKS else 0)
         if at > end:
             raise _damaged("it ends within a chunk")
+        if most < 0:
+            raise _damaged("its chunks take far more bytes than its pixels")
         if kind not in _PNG_CHUNKS:
             continue
         data, checksum = file.read(length), file.read(4)
@@ -164,9 +178,21 @@ def _inflated_bytes(parts: Iterable[bytes], enough: int) -> int:
             while part and count < enough:
                 count += len(inflate.decompress(part, 2**20))
                 part = inflate.unconsumed_tail
-        return count + len(inflate.flush())
+        # Not flush() where there is enough: it would inflate all that is left, at once.
+        return count if count >= enough else count + len(inflate.flush())
     except zlib.error as error:
         raise _damaged(error) from None
+
+
+def _read_bmp(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | None]:
+    header, compression = _BMP_START.unpack(file.read(_BMP_START.size).ljust(_BMP_START.size, b"\0"))
+    file.seek(0)
+    if header > _BMP_LONGEST_HEADER:
+        raise _damaged(f"it has a header of {header} bytes")
+    # Pillow decompresses in a loop in Python, and old ones without a limit.
+    if header > _BMP_SHORT_HEADER and compression not in _BMP_PLAIN:
+        raise MapError("is a compressed BMP; save it without compression, or as PNG")
+    return _read_with_pillow(BmpImagePlugin.BmpImageFile, file, max_cells, 8)
 
 
 def _read_with_pillow(reader: type[Image.Image], file: BinaryIO, max_cells: int,

@@ -4,8 +4,10 @@ The command line's flags, the node's parameters and the documentation are derive
 """
 
 import dataclasses
-import math
+import sys
 from typing import Any, NamedTuple
+
+from .wording import quoted
 
 
 class OptionError(ValueError):
@@ -46,16 +48,14 @@ class Option(NamedTuple):
         Raises:
             OptionError: the value is of another type, not finite or out of range.
         """
-        if self.type is float and type(value) is int:
-            value = float(value)
-        fits = type(value) is self.type
+        fits = type(value) is self.type or (self.type, type(value)) == (float, int)
         if fits and self.type in (int, float):
-            fits = math.isfinite(value) and self.low <= value <= self.high
+            fits = self.low <= value <= self.high  # which is exact for an integer that no float can hold, and false for NaN
         if fits and self.choices:
             fits = value in self.choices
         if not fits:
-            raise OptionError(f"{self.name} is {value!r}; it takes {self.allowed()}: {self.help}")
-        return value
+            raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}")
+        return float(value) if self.type is float else value
 
 
 def option(default: Any, help: str, *, unit: str = "", low: float | None = None, high: float | None = None,
@@ -75,6 +75,11 @@ def convert_options(instance: Any) -> None:
     """Check and convert every option of a frozen dataclass; to be called from its `__post_init__`."""
     for item in options(type(instance)):
         object.__setattr__(instance, item.name, item.convert(getattr(instance, item.name)))
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite float, or an integer that a float can hold; true and false are none."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 def values(instance: Any) -> dict[str, Any]:

@@ -8,16 +8,20 @@ from dubins_rrt_ros import __version__
 
 from .dubins import WORDS, DubinsCurve
 from .map import Map
-from .options import options, values
+from .options import is_number, options, values
 from .path import Path
-from .problem import Pose, Problem, checked_pose
+from .problem import Problem, checked_pose
 from .result import Plan
 from .settings import Settings
 from .vehicle import Vehicle
+from .wording import one_line, quoted
 
 
 class PlanFileError(ValueError):
-    """A document that holds no plan; the message says what is wrong with it."""
+    """A document that holds no plan; the message, one line, says what is wrong with it."""
+
+    def __init__(self, message: str):
+        super().__init__(one_line(message))
 
 
 def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
@@ -66,8 +70,8 @@ def read_request(document: Mapping[str, Any], map: Map) -> tuple[Problem, Settin
     fields = dict(_field(document, "settings", Mapping))
     vehicle = Vehicle(**_known(Vehicle, _field(document, "vehicle", Mapping), "vehicle"))
     request = {item.name: fields.pop(item.name) for item in options(Problem) if item.name in fields}
-    problem = Problem(map, vehicle, checked_pose("start", _field(document, "start", list)),
-                      checked_pose("goal", _field(document, "goal", list)), **request)
+    start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
+    problem = Problem(map, vehicle, start, goal, **request)
     fields = _known(Settings, fields, "settings")
     limit = next(item.high for item in options(Settings) if item.name == "planning_time")
     drawn = _field(document, "samples", int)
@@ -92,14 +96,18 @@ def _read_curve(curve: Any) -> DubinsCurve:
         raise PlanFileError("one of its curves is no object")
     word = _field(curve, "word", str)
     if word not in WORDS:
-        raise PlanFileError(f"one of its curves has the word {word!r}; there are {', '.join(WORDS)}")
-    return DubinsCurve(_triple(_field(curve, "start", list), "start"), _field(curve, "radius", float), word,
-                       _triple(_field(curve, "lengths", list), "lengths"))
+        raise PlanFileError(f"one of its curves has the word {quoted(word)}; there are {', '.join(WORDS)}")
+    start, lengths = (_triple(_field(curve, name, list), name) for name in ("start", "lengths"))
+    radius = _field(curve, "radius", float)
+    if not (0 < radius < math.inf and min(lengths) >= 0):
+        raise PlanFileError(f"one of its curves has the radius {radius:g} and the lengths {lengths}; the radius must be above 0, "
+                            "and no length below")
+    return DubinsCurve(start, radius, word, lengths)
 
 
-def _triple(numbers: Any, name: str) -> Pose:
-    if not (isinstance(numbers, list) and len(numbers) == 3 and all(isinstance(n, int | float) for n in numbers)):
-        raise PlanFileError(f"{name} holds {numbers!r} where three numbers are due")
+def _triple(numbers: Any, name: str) -> tuple[float, float, float]:
+    if not (isinstance(numbers, list) and len(numbers) == 3 and all(map(is_number, numbers))):
+        raise PlanFileError(f"{name} holds {quoted(numbers)} where three finite numbers are due")
     return tuple(map(float, numbers))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from .map import Map
 from .options import convert_options, option
 from .vehicle import Vehicle
+from .wording import quoted
 
 Pose = tuple[float, float, float]
 
@@ -68,10 +69,10 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
     """
     try:
         numbers = tuple(map(float, pose))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise InvalidPose(f"The {name} pose is {pose}; give three finite numbers: x [m], y [m], yaw [rad].")
+        raise InvalidPose(f"The {name} pose is {quoted(pose)}; give three finite numbers: x [m], y [m], yaw [rad].")
     if abs(numbers[2]) > LARGEST_YAW:
         raise InvalidPose(f"The {name} pose has the yaw {numbers[2]:g} rad; give one within {LARGEST_YAW:g} rad of 0, "
                           "where rounding leaves its direction exact.")

@@ -5,10 +5,14 @@ import math
 import reprlib
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import shapely
 
-from .options import OptionError, convert_options, option, options
+from .options import OptionError, convert_options, is_number, option, options
+
+#: The most corners of a footprint.
+MAX_CORNERS = 100
 
 
 @dataclass(frozen=True)
@@ -70,11 +74,12 @@ def _corners(footprint: str) -> tuple[tuple[float, float], ...]:
         OptionError: they are not three or more of two finite numbers each, or not those of a polygon around (0, 0).
     """
     try:
-        corners = [(float(x), float(y)) for x, y in json.loads(footprint)]
-    except (ValueError, TypeError, RecursionError):
-        corners = []
-    if len(corners) < 3 or not all(map(math.isfinite, sum(corners, ()))):
-        raise _refused(footprint, "give at least three corners in metres")
+        corners = json.loads(footprint)
+    except (ValueError, RecursionError):
+        corners = None
+    if not (isinstance(corners, list) and 3 <= len(corners) <= MAX_CORNERS and all(map(_is_corner, corners))):
+        raise _refused(footprint, f"give at least three corners in metres, {MAX_CORNERS} at most")
+    corners = [(float(x), float(y)) for x, y in corners]
     polygon = shapely.Polygon(corners)
     if not polygon.is_valid:
         raise _refused(footprint, "its edges cross or touch; give the corners one after the other along the outline")
@@ -87,6 +92,10 @@ def _corners(footprint: str) -> tuple[tuple[float, float], ...]:
 def _distance_to(outline: tuple[tuple[float, float], ...]) -> float:
     """How far the reference point is from an outline around it [m]."""
     return float(shapely.distance(shapely.LinearRing(outline), shapely.Point(0, 0)))
+
+
+def _is_corner(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
 
 
 def _refused(footprint: str, reason: str) -> OptionError:

@@ -136,10 +136,14 @@ def test_rows_are_named_and_problems_chosen():
     ([entry(start=[1, 2])], "problem 1, hall: The start pose is"), ([entry(goal=["1", 2, 3])], "The goal pose is"),
     ([entry(goal="123")], "The goal pose is"), ([entry(start=[1, float("nan"), 3])], "The start pose is"),
     ([entry(turning_radius="1")], "turning_radius is '1'"), ([entry(turning_radius=0)], "turning_radius is 0"),
-    ([entry(robot_radius=-1)], "robot_radius is -1")])
+    ([entry(robot_radius=-1)], "robot_radius is -1"), ([entry(robot_radius=10**400)], "robot_radius is 1000"),
+    ([entry(goal=[10**400, 0, 0])], "The goal pose is [1000"), ([entry(map="m" * 5000)], "there is no map file"),
+    ([entry(name="two\nlines", map="gone.wkt")], "problem 1, two lines: there is no map file"),
+    ([entry(name="two\nlines")] * 2, "several problems have the name two lines")])
 def test_a_file_of_problems_that_is_none_takes_one_line(document, says, capsys):
     Path("set/problems.json").write_text(json.dumps(document))
-    assert says in refusal("set/problems.json", "--out", "runs.jsonl", capsys=capsys)
+    line = refusal("set/problems.json", "--out", "runs.jsonl", capsys=capsys)
+    assert says in line and line[:-1].isprintable()
     assert not Path("runs.jsonl").exists()
 
 

@@ -11,6 +11,7 @@ import shapely
 
 from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
+from dubins_rrt_ros.planning.wording import LONGEST
 
 FIGURES = ("time_to_first", "planning_time", "map_time", "length", "lower_bound", "gap", "min_clearance",
            "max_curvature")
@@ -95,10 +96,13 @@ def changed(answer, **fields):
 @pytest.mark.parametrize(("field", "value", "names"), [
     ("settings", None, "settings"), ("vehicle", [], "vehicle"), ("start", [1.0, 2.0], "start"),
     ("samples", "many", "samples"), ("vehicle", {"turning_radius": 1.0}, "wheelbase"),
-    ("settings", {"flux": 1}, "flux")])
+    ("settings", {"flux": 1}, "flux"), ("start", ["1", "2", "3"], "start"), ("goal", [10**400, 0, 0], "goal"),
+    ("goal", [True, 0, 0], "goal"), ("start", [[]] * 3, "start"), ("goal", [math.nan, 0, 0], "goal"),
+    ("vehicle", {"two\nlines" * 999: 1}, "two lines")])
 def test_a_document_with_a_wrong_request_names_the_field(answer, hall, field, value, names):
-    with pytest.raises(ValueError, match=names):
+    with pytest.raises(PlanFileError, match=names) as refusal:
         read_request(changed(answer, **{field: value}), hall)
+    assert str(refusal.value).isprintable() and len(str(refusal.value)) <= LONGEST
 
 
 def test_a_setting_out_of_range_is_refused(answer, hall):
@@ -108,9 +112,21 @@ def test_a_setting_out_of_range_is_refused(answer, hall):
         read_request(document, hall)
 
 
+FINE = {"word": "LSL", "start": [0, 1, 2.0], "radius": 1.0, "lengths": [1, 0.5, 0.5]}
+
+
 @pytest.mark.parametrize(("curve", "names"), [
+    (FINE | {"radius": 0.0}, "radius"), (FINE | {"radius": -1.0}, "radius"), (FINE | {"radius": math.inf}, "radius"),
+    (FINE | {"radius": math.nan}, "radius"), (FINE | {"lengths": [1.0, -1.0, 0.0]}, "length"),
+    (FINE | {"lengths": [1.0, math.inf, 0.0]}, "lengths"), (FINE | {"start": [10**400, 0, 0]}, "start"),
+    (FINE | {"start": [True, 0, 0]}, "start"), (FINE | {"word": "L" * 5000}, "word"),
     (7, "curves"), ({}, "word"), ({"word": "LLL"}, "LLL"), ({"word": "LSL", "start": [0.0, 0.0]}, "start"),
-    ({"word": "LSL", "start": [0.0, 0.0, 0.0], "radius": "1"}, "radius")])
+    (FINE | {"radius": "1"}, "radius")])
 def test_a_document_with_a_wrong_curve_names_the_field(answer, curve, names):
-    with pytest.raises(PlanFileError, match=names):
+    with pytest.raises(PlanFileError, match=names) as refusal:
         read_path(changed(answer, curves=[curve]))
+    assert len(str(refusal.value)) < 300
+
+
+def test_a_curve_that_is_none_of_ours_is_read(answer):
+    assert read_path(changed(answer, curves=[FINE])).length == 2.0

@@ -19,6 +19,7 @@ DOUBLE, INTEGER, BOOL, STRING = (ParameterType.PARAMETER_DOUBLE, ParameterType.P
                                  ParameterType.PARAMETER_STRING)
 PARAMETERS = {
     "map_file": (STRING, None, "other.yaml"),
+    "map_directory": (STRING, "", "/"),
     "global_frame": (STRING, "map", ""),
     "planner": (STRING, "rrt_star", "dijkstra"),
     "turning_radius": (DOUBLE, 1.0, -1.0),

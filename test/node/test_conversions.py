@@ -228,6 +228,11 @@ def test_a_large_polygon_map_is_published_coarser():
     assert 0.9 * RASTER_CELLS < coarse.data.size < 1.1 * RASTER_CELLS
 
 
+@pytest.mark.parametrize("size", [(9e7, 1.0), (1e-6, 9e7), (1e6, 5e-300)])
+def test_a_long_and_thin_polygon_map_is_published_with_no_more_cells(size):
+    assert as_grid(PolygonMap(shapely.box(0, 0, *size))).data.size <= 2 * RASTER_CELLS
+
+
 KEYS = ["plan_id", "revision", "error_code", "error_name", "planner", "samples", "tree_nodes", "path_length",
         "lower_bound", "gap", "time_to_first", "planning_time", "min_clearance", "max_curvature", "audit",
         "seed", "map_id"]

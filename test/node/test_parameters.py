@@ -3,6 +3,7 @@
 import array
 import json
 import math
+import os
 from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,12 +19,13 @@ from rclpy.parameter import Parameter
 from dubins_rrt_ros.node.parameter_files import WIDTH, as_yaml, unused_files
 from dubins_rrt_ros.node.parameters import OPTIONS, READ_ONLY, Parameters, configuration
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
+from dubins_rrt_ros.planning.wording import LONGEST
 
 CONTRACT = {
     "map_file", "global_frame", "planner", "turning_radius", "wheelbase", "max_steering_angle", "robot_radius",
     "allow_unknown", "samples", "planning_time", "goal_bias", "step_size", "heading_sampling", "goal_tolerance_xy",
     "goal_tolerance_yaw", "any_goal_heading", "path_spacing", "seed", "publish_tree", "map_transient_local",
-    "max_map_cells", "replan_on_map_change",
+    "max_map_cells", "map_directory", "replan_on_map_change",
 }
 CONFIG = Path(__file__).parents[2] / "config" / "planner.yaml"
 
@@ -248,11 +250,31 @@ def test_the_warning_of_a_file_has_the_names_that_it_has(tmp_path):
         f"Parameter file '{empty}' is ignored, as it has no ros__parameters; name /planner or /** in it"]
 
 
-@pytest.mark.parametrize("content", [None, b"\xff", b"a: [", b"&a {b: *a}"])
+@pytest.mark.parametrize("content", [None, b"\xff", b"a: [", b"&a {b: *a}", b"a: &a {}\nb: *a\n", b"#" * 2**20,
+                                     b'a: "\\U7fffffff"'])
 def test_a_file_that_cannot_be_read_gives_no_warning(tmp_path, content):
     if content is not None:
         (tmp_path / "p.yaml").write_bytes(content)
     assert unused_files(["--ros-args", "--params-file", str(tmp_path / "p.yaml")], "/planner") == []
+
+
+def test_a_pipe_is_not_read_again_after_ros(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert unused_files(["--ros-args", "--params-file", str(tmp_path / "pipe")], "/planner") == []
+
+
+def test_many_wildcards_do_not_take_for_ever(tmp_path):
+    (tmp_path / "p.yaml").write_text(json.dumps({"/**" * 330: SAMPLES}))
+    arguments = ["--ros-args", "--params-file", str(tmp_path / "p.yaml")]
+    assert unused_files(arguments, "/a/b/c/planner") == []
+    (tmp_path / "p.yaml").write_text(json.dumps({"/**" * 330 + "/other": SAMPLES}))
+    assert len(unused_files(arguments, "/a/b/c/planner")) == 1
+
+
+def test_the_warning_of_a_file_with_odd_names_is_one_line(tmp_path):
+    (tmp_path / "p.yaml").write_text(json.dumps({f"two\nlines\x07{number}": SAMPLES for number in range(400)}))
+    warning, = unused_files(["--ros-args", "--params-file", str(tmp_path / "p.yaml")], "/planner")
+    assert warning.isprintable() and len(warning) <= LONGEST
 
 
 def test_the_parameter_file_of_the_package_is_the_one_that_is_printed():

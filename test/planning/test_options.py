@@ -107,6 +107,20 @@ def test_a_choice_takes_its_choices(cls, item):
         assert_refused(cls, item, value)
 
 
+def test_integers_that_no_float_can_hold_are_refused_in_short():
+    for make in (lambda: Settings(samples=10**400), lambda: Settings(goal_bias=-10**400), lambda: Vehicle(robot_radius=10**6000)):
+        with pytest.raises(OptionError, match=" is .*; it takes ") as refusal:
+            make()
+        assert len(str(refusal.value)) < 400
+
+
+def test_long_values_are_refused_in_short():
+    for value in ("n" * 10**6, {"k" * 999: "v" * 999}, [["n" * 999] * 999] * 999):
+        with pytest.raises(OptionError, match="^planner is ") as refusal:
+            Settings(planner=value)
+        assert len(str(refusal.value)) < 400
+
+
 def test_options_are_frozen():
     with pytest.raises(FrozenInstanceError):
         Settings().samples = 5
@@ -127,7 +141,7 @@ def test_wheelbase_and_steering_angle_go_together(half):
 
 
 @pytest.mark.parametrize("pose", [
-    (0, 0), (0, 0, 0, 0), (math.nan, 0, 0), (0, math.inf, 0), (0, 0, -math.inf), "abc", None, 5,
+    (0, 0), (0, 0, 0, 0), (math.nan, 0, 0), (0, math.inf, 0), (0, 0, -math.inf), "abc", None, 5, (10**400, 0, 0),
     (None, 0, 0), ("x", 0, 0), ()])
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_invalid_pose(end, pose):

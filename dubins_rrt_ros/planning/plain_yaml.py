@@ -1,0 +1,37 @@
+"""YAML whose scalars stay texts, loaded without constructing objects."""
+
+from itertools import accumulate
+from typing import Any
+
+import yaml
+
+#: How many brackets may be open at once: PyYAML takes seconds for a line of a thousand.
+DEEPEST = 50
+
+
+def load_plain(text: str, *, aliases: bool) -> Any:
+    """What a YAML document holds, in dicts, lists and texts.
+
+    YAML 1.1 would make 1e-2 text, 010 eight, an image named 2024 a number, and a mode named off a boolean.
+
+    Args:
+        text: the document.
+        aliases: whether it may have any; a few lines of them can stand for billions of values, which take no memory, but time
+            to go through.
+
+    Raises:
+        yaml.YAMLError: it is no valid YAML, or has an alias where none may be.
+        RecursionError: it is nested too deep.
+        ValueError, OverflowError: it has a character that there is not.
+    """
+    # Those in quotes and comments count too: it is not worth telling them apart.
+    if max(accumulate((letter in "[{") - (letter in "]}") for letter in text), default=0) > DEEPEST:
+        raise RecursionError
+    return yaml.load(text, Loader=yaml.BaseLoader if aliases else _Loader)
+
+
+class _Loader(yaml.BaseLoader):
+    def compose_node(self, parent, index):
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.composer.ComposerError(None, None, "there is an alias", self.peek_event().start_mark)
+        return super().compose_node(parent, index)
