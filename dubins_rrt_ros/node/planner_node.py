@@ -201,7 +201,7 @@ class PlannerNode(Node):
         problem = Problem(used.map, now.vehicle, start, goal, **{**now.problem, **wanted})
         preparation = self._maps.prepared()
         preparation.is_wanted = True
-        return Request(plan_id, problem, now.settings, preparation.done)
+        return Request(plan_id, problem, now.settings, preparation.done, now.node.check_invariants)
 
     def _submit(self, worker: Worker, request: Request, ended: Callable, improved: Callable | None = None) -> Future:
         """Have a request served; the future's result, which `ended` is called with too, says how it ended."""

@@ -29,12 +29,14 @@ class Request:
         id: the plan_id of its answers.
         problem, settings: what plan() takes.
         prepared: set once the clearance of the problem's map is computed.
+        check_invariants: whether every answer is checked, the improvements too.
     """
 
     id: int
     problem: Problem
     settings: Settings
     prepared: threading.Event
+    check_invariants: bool = False
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
         """Plan.
@@ -46,6 +48,7 @@ class Request:
 
         Raises:
             Refusal: it was cancelled before it was begun.
+            PlanError, PathError, TreeError: an answer broke an invariant.
         """
         self._await_map(cancelled)
         throttle = _Throttle(IMPROVEMENT_INTERVAL)
@@ -54,9 +57,14 @@ class Request:
             if improved and throttle.lets_pass(progress.improved) and not cancelled():
                 snapshot = progress.snapshot()
                 if snapshot.path is not None:
-                    improved(snapshot)
+                    improved(self._checked(snapshot))
 
-        return plan(self.problem, self.settings, cancel=cancelled, on_progress=on_progress)
+        return self._checked(plan(self.problem, self.settings, cancel=cancelled, on_progress=on_progress))
+
+    def _checked(self, answer: Plan) -> Plan:
+        if self.check_invariants:
+            answer.check()
+        return answer
 
     def _await_map(self, cancelled: Callable[[], bool]) -> None:
         while not self.prepared.wait(PREPARING_INTERVAL) and not cancelled():

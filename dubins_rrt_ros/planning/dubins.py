@@ -15,6 +15,13 @@ from .problem import Pose
 
 WORDS: tuple[str, ...] = _kernel.WORDS
 
+#: By how much rounding may change a length, as a share of it.
+ROUNDING = 1e-9
+
+
+class CurveError(ValueError):
+    """A curve that breaks one of its invariants; the message says which, with its figures."""
+
 
 @dataclass(frozen=True)
 class DubinsCurve:
@@ -72,6 +79,30 @@ class DubinsCurve:
         out = np.empty((len(stations), 3))
         _kernel.poses_along(*self.start, self.radius, WORDS.index(self.word), *self.lengths, stations, out)
         return out
+
+    def check(self) -> None:
+        """Check the invariants: a car can drive it, and its turns are those of a shortest curve or of a piece of one.
+
+        Raises:
+            CurveError: one does not hold.
+        """
+        if self.word not in WORDS:
+            raise CurveError(f"{self.word!r} is none of the words {', '.join(WORDS)}")
+        if not all(map(math.isfinite, self.start)):
+            raise CurveError(f"it starts at {self.start}, where not all numbers are finite")
+        if not 0 < self.radius < math.inf:
+            raise CurveError(f"its turning radius is {self.radius} m, not positive and finite")
+        if not all(0 <= length < math.inf for length in self.lengths):
+            raise CurveError(f"its arcs are {self.lengths} m long, not all of them finite and at least 0")
+        self._check_turns()
+
+    def _check_turns(self) -> None:
+        turns = [length / self.radius for turn, length in zip(self.word, self.lengths, strict=True) if turn != "S"]
+        if max(turns) > math.tau * (1 + ROUNDING):
+            raise CurveError(f"an arc of {self.word} turns by {max(turns):.9g} rad, more than a full circle")
+        # All three are there: it is no piece of a longer curve that was cut within the second.
+        if len(turns) == 3 and min(turns) > 0 and turns[1] < math.pi * (1 - ROUNDING):
+            raise CurveError(f"the second arc of {self.word} turns by {turns[1]:.9g} rad, less than pi, as on no shortest curve")
 
 
 def shortest(start: Pose, goal: Pose, radius: float) -> DubinsCurve:

@@ -1,11 +1,12 @@
 """What plan() returns."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
-from .path import Path
+from .dubins import ROUNDING
+from .path import JOINT, Path
 from .problem import Problem
 from .settings import Settings
 from .tree import Tree
@@ -29,6 +30,10 @@ class Status(IntEnum):
     CANCELLED = 213
 
 
+class PlanError(ValueError):
+    """An answer that breaks one of its invariants; the message says which, with its figures."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The answer to a request; the tree is part of it, also on failure.
@@ -46,7 +51,8 @@ class Plan:
         planning_time: from request to answer, the clearance field not counted [s].
         map_time: for the clearance field, and the loading of the map where the caller added it [s].
         lower_bound: no path of the problem is shorter [m].
-        min_clearance: the least distance from the path to an obstacle, by the audit [m], or None.
+        min_clearance: by the audit, the least distance to an obstacle from the path, on which the vehicle's reference point runs,
+            where the vehicle is a disc, and from all that it sweeps where it is a polygon [m], or None.
         max_curvature: of the path, by the audit [1/m], or None.
         audit: "ok" with a path, else what the audit found, or "" where there was nothing to audit.
     """
@@ -81,6 +87,72 @@ class Plan:
         if self.lower_bound == 0:
             return math.inf if self.length > 0 else 0.0
         return self.length / self.lower_bound - 1
+
+    def check(self) -> None:
+        """Check the invariants: those of the tree and of the path, and that all parts of the answer fit each other.
+
+        Raises:
+            PlanError, PathError, TreeError: one does not hold.
+        """
+        self.tree.check()
+        if self.path is not None:
+            self.path.check()
+        if breach := next(self._breaches(), None):
+            raise PlanError(breach)
+
+    def _breaches(self) -> Iterator[str]:
+        """A sentence for each invariant that does not hold, with a path or without."""
+        problem, settings = self.problem, self.settings
+        if not self.message or "\n" in self.message:
+            yield f"the message is {self.message!r}, not one line"
+        if (self.status == Status.NONE) != (self.path is not None):
+            yield f"the status is {self.status.name} {'without' if self.path is None else 'with'} a path"
+        if not 0 <= self.samples <= settings.samples:
+            yield f"{self.samples} samples were drawn of {settings.samples}"
+        if settings.seed < 0:
+            yield f"the seed that was used is {settings.seed}"
+        if not (self.planning_time >= 0 and self.map_time >= 0):
+            yield f"the planning took {self.planning_time} s and the map {self.map_time} s"
+        if not self.lower_bound >= 0:
+            yield f"the lower bound is {self.lower_bound} m"
+        if tuple(self.tree.poses[0].tolist()) != problem.start:
+            yield f"the tree begins at {self.tree.poses[0].tolist()}, not at {problem.start}"
+        if self.tree.radius != problem.vehicle.turning_radius:
+            yield f"the tree turns with a radius of {self.tree.radius} m, not {problem.vehicle.turning_radius} m"
+        yield from self._breaches_without_path() if self.path is None else self._breaches_with_path(self.path)
+
+    def _breaches_with_path(self, path: Path) -> Iterator[str]:
+        problem = self.problem
+        if path.start != problem.start:
+            yield f"the path starts at {path.start}, not at {problem.start}"
+        off, turned = math.dist(path.end[:2], problem.goal[:2]), abs(math.remainder(path.end[2] - problem.goal[2], math.tau))
+        if off > problem.goal_tolerance_xy + JOINT or turned > problem.yaw_tolerance + JOINT:
+            yield f"the path ends {off:.3g} m and {turned:.3g} rad from the goal, whose tolerance is " \
+                  f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"
+        if self.audit != "ok" or self.min_clearance is None or self.max_curvature is None:
+            yield f"there is a path, but its audit is {self.audit!r} with the least clearance {self.min_clearance} m and " \
+                  f"the curvature {self.max_curvature}/m"
+        elif not (self.max_curvature * problem.vehicle.turning_radius <= 1 + JOINT and self.min_clearance >= 0):
+            yield f"the path bends by {self.max_curvature}/m, the vehicle by {1 / problem.vehicle.turning_radius}/m at most, " \
+                  f"and the least clearance is {self.min_clearance} m"
+        if self.lower_bound > self.length * (1 + ROUNDING):
+            yield f"the path is {self.length} m long, less than the lower bound {self.lower_bound} m"
+        if self.time_to_first is None or not 0 <= self.time_to_first <= self.planning_time:
+            yield f"the first path came after {self.time_to_first} s of {self.planning_time} s"
+        if not self._is_in_tree(path):
+            yield f"the path of {path.length} m to {path.end} is not in the tree of {len(self.tree)} nodes"
+
+    def _breaches_without_path(self) -> Iterator[str]:
+        if self.cancelled != (self.status == Status.CANCELLED):
+            yield f"the status is {self.status.name}, and cancelled is {self.cancelled}"
+        if self.audit == "ok" or self.min_clearance is not None or self.max_curvature is not None:
+            yield f"there is no path, but its audit is {self.audit!r} with the least clearance {self.min_clearance} m and " \
+                  f"the curvature {self.max_curvature}/m"
+
+    def _is_in_tree(self, path: Path) -> bool:
+        """Whether a node of the tree is reached by just this path."""
+        ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path.length)
+        return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
 
 
 @dataclass(frozen=True)

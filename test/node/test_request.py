@@ -9,7 +9,7 @@ import pytest
 
 from dubins_rrt_ros.node import request as module
 from dubins_rrt_ros.node.request import IMPROVEMENT_INTERVAL, Refusal, Request, _Throttle
-from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle
+from dubins_rrt_ros.planning import GridMap, PlanError, Problem, Progress, Settings, Status, Vehicle, plan
 
 ENDLESS = {"samples": 10_000_000, "planning_time": 600.0, "seed": 1}
 
@@ -105,6 +105,28 @@ def test_a_defect_in_the_planner_is_raised(request_for, monkeypatch):
     monkeypatch.setattr(module, "plan", fail)
     with pytest.raises(ZeroDivisionError, match="a defect"):
         request_for().serve(pytest.fail, never)
+
+
+def test_an_answer_is_checked_where_that_is_wanted(request_for, monkeypatch):
+    genuine = module.plan
+    monkeypatch.setattr(module, "plan", lambda *args, **more: replace(genuine(*args, **more), message=""))
+    request = request_for(samples=10, planning_time=60.0, seed=1)
+    assert request.serve(None, never).message == ""
+    with pytest.raises(PlanError, match="the message is ''"):
+        replace(request, check_invariants=True).serve(None, never)
+
+
+def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, monkeypatch):
+    """And what it would have answered is not reported."""
+    def report_broken(problem, settings, *, cancel, on_progress):
+        answer = plan(problem, settings)
+        on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit="")))
+        return answer
+
+    monkeypatch.setattr(module, "plan", report_broken)
+    request = replace(request_for(samples=10, planning_time=60.0, seed=1), check_invariants=True)
+    with pytest.raises(PlanError, match="its audit is ''"):
+        request.serve(pytest.fail, never)
 
 
 def test_the_throttle_lets_the_first_improvement_pass_at_once(clock):
