@@ -6,7 +6,7 @@ from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
 from dubins_rrt_ros.planning.plan_file import PlanFileError
 
-from . import bench, demo, plan, render
+from . import audit, bench, demo, plan, render
 from .flags import Parser, UsageError, guard_numbers
 
 SUCCESS, NO_PATH, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
@@ -16,7 +16,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line `argv`, by default the process' own.
 
     Returns:
-        The exit status: 0 a path, 1 no path, 2 wrong usage, 130 interrupted.
+        The exit status: 0 a path, 1 no path or a wrong one, 2 wrong usage, 130 interrupted.
     """
     arguments = _parser().parse_args(guard_numbers(sys.argv[1:] if argv is None else argv))
     try:
@@ -34,11 +34,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 done, 1 no path, 2 wrong usage, 130 interrupted.",
+    parser = Parser(prog="dubins_rrt", epilog="Exit status: 0 done, 1 no path or a wrong one, 2 wrong usage, 130 interrupted.",
                     description="Plans paths for a vehicle that drives forward and cannot turn on the spot.")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (plan, bench, demo, render):
+    for command in (plan, audit, bench, demo, render):
         command.add_to(subparsers)
     return parser
 

@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 from dubins_rrt_ros.planning import Plan
 from dubins_rrt_ros.planning.plan_file import to_document
@@ -38,7 +39,12 @@ def check_drawing(file: str | None) -> None:
 
 def write_json(file: str, plan: Plan, map_name: str) -> None:
     """Write the plan; `file` may be - for standard output."""
-    text = json.dumps(to_document(plan, map_name), allow_nan=False)
+    write_document(file, to_document(plan, map_name))
+
+
+def write_document(file: str, document: dict[str, Any]) -> None:
+    """Write JSON; `file` may be - for standard output."""
+    text = json.dumps(document, allow_nan=False)
     if file == STDOUT:
         print(text)
     else:

@@ -1,0 +1,153 @@
+"""`dubins_rrt audit`: judge a path, whoever planned it."""
+
+import argparse
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dubins_rrt_ros import __version__
+from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Problem, Vehicle, audit, values
+from dubins_rrt_ros.planning.audit_poses import audit_poses, driven_length
+from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
+from dubins_rrt_ros.planning.wording import quoted
+
+from .bench_problems import read_json
+from .flags import UsageError, add_option_flags, given_options
+from .output import STDOUT, check_folder, write_document
+from .request import MAX_MAP_CELLS, read_map
+
+#: How far poses may be off by default [m, rad]: ample for four digits behind the point.
+TOLERANCE_XY, TOLERANCE_YAW = 1e-3, 1e-3
+#: The largest number in a pose that is taken [m, rad].
+LARGEST = 1e6
+#: What a flag of the vehicle takes the place of, where a plan has it.
+_REPLACES = {"turning_radius": {"wheelbase": 0.0, "max_steering_angle": 0.0}, "robot_radius": {"footprint": ""}}
+
+
+class Verdict(NamedTuple):
+    """What was judged: the problem and the path's length [m]; and what was found."""
+
+    problem: Problem
+    length: float
+    audit: Audit
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "audit", help="judge a path, whoever planned it", argument_default=argparse.SUPPRESS,
+        description="Judges a path by code that shares nothing with the planner: whether a car can drive it, no tighter than "
+                    "its turning radius, and whether all that the vehicle sweeps, between poses too, is clear of the obstacles.",
+        epilog="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
+               "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
+               "of constant curvature from each to the next, with the vehicle that the flags describe. Example: `dubins_rrt "
+               "audit theirs.json maze --turning-radius 1 --footprint '[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]'`. "
+               "Exit status: 0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage.")
+    parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
+    parser.add_argument("map", metavar="MAP",
+                        help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze")
+    parser.add_argument("--json", metavar="FILE", help="write the verdict; - is standard output")
+    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
+                        help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
+    pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW")}
+    parser.add_argument("--start", **pose, help="where the path shall begin [m, m, rad]; by default where a plan says")
+    parser.add_argument("--goal", **pose, help="where it shall end [m, m, rad]; by default where a plan says")
+    _add_tolerances(parser.add_argument_group("poses"))
+    for title, cls in (("vehicle", Vehicle), ("request", Problem)):
+        add_option_flags(parser, title, cls)
+    parser.set_defaults(run=run)
+
+
+def _add_tolerances(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--tolerance-xy", metavar="m", type=float, default=TOLERANCE_XY,
+                       help="how far a stretch of poses may run to the side or back, besides what --tolerance-yaw allows; what "
+                            f"poses are off their arcs is added to the clearance needed [m]; default {TOLERANCE_XY:g}")
+    group.add_argument("--tolerance-yaw", metavar="rad", type=float, default=TOLERANCE_YAW,
+                       help="how much more than the turning radius allows a stretch of poses may turn, and by what angle it may "
+                            f"run to the side [rad]; default {TOLERANCE_YAW:g}")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Judge, report, and return the exit status."""
+    file = getattr(arguments, "json", None)
+    check_folder(file)
+    for name in ("tolerance_xy", "tolerance_yaw"):
+        if not 0 <= getattr(arguments, name) < math.inf:
+            raise UsageError(f"--{name.replace('_', '-')} is {getattr(arguments, name):g}; give 0 or more")
+    verdict = _judge(arguments)
+    if file:
+        write_document(file, _document(verdict, arguments.map))
+    out = sys.stderr if file == STDOUT else sys.stdout
+    print(_sentence(arguments.path, verdict), *verdict.audit.findings, sep="\n", file=out)
+    return 0 if verdict.audit.ok else 1
+
+
+def _judge(arguments: argparse.Namespace) -> Verdict:
+    document = read_json(arguments.path)
+    map, _ = read_map(arguments.map, arguments.max_map_cells)
+    try:
+        judge = _judge_plan if isinstance(document, Mapping) and "curves" in document else _judge_poses
+        return judge(document, map, arguments)
+    except (PlanFileError, InvalidPose) as error:
+        raise UsageError(f"{arguments.path}: {error}") from error
+
+
+def _judge_plan(document: Mapping[str, Any], map: Map, arguments: argparse.Namespace) -> Verdict:
+    problem, _ = read_request(document, map)
+    path = read_path(document)
+    if path is None:
+        raise PlanFileError(f"it holds no path but {quoted(document.get('error_name'))}; there is nothing to judge")
+    given = given_options(arguments, Vehicle)
+    replaced = {name: value for flag in given for name, value in _REPLACES.get(flag, {}).items()}
+    problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments),
+                      **given_options(arguments, Problem))
+    return Verdict(problem, path.length, audit(path, problem))
+
+
+def _judge_poses(document: Any, map: Map, arguments: argparse.Namespace) -> Verdict:
+    poses = _poses(document)
+    ends = {"start": poses[0], "goal": poses[-1]} | _ends(arguments)
+    problem = Problem(map, Vehicle(**given_options(arguments, Vehicle)), **ends, **given_options(arguments, Problem))
+    return Verdict(problem, driven_length(poses), audit_poses(poses, problem, arguments.tolerance_xy, arguments.tolerance_yaw))
+
+
+def _ends(arguments: argparse.Namespace) -> dict[str, list[float]]:
+    """The start and the goal, where they were given."""
+    return {name: getattr(arguments, name) for name in ("start", "goal") if name in arguments}
+
+
+def _poses(document: Any) -> np.ndarray:
+    """(n, 3) the poses in a document."""
+    poses = document.get("poses") if isinstance(document, Mapping) else document
+    if not (isinstance(poses, list) and poses):
+        raise PlanFileError('it holds no poses; give [[x, y, yaw], ...] or {"poses": [[x, y, yaw], ...]}, one pose at least')
+    for i, pose in enumerate(poses):
+        if not (isinstance(pose, list) and len(pose) == 3 and all(type(n) in (int, float) and abs(n) <= LARGEST for n in pose)):
+            raise PlanFileError(f"pose {i} is {quoted(pose)}; give three numbers, x [m], y [m] and yaw [rad], none beyond "
+                                f"{LARGEST:g}")
+    return np.array(poses, dtype=float)
+
+
+def _sentence(file: str, verdict: Verdict) -> str:
+    """The verdict with its figures."""
+    found = verdict.audit
+    count = f"fails with {len(found.findings)} finding{'s' * (len(found.findings) > 1)}"
+    vehicle = verdict.problem.vehicle
+    need = "of its footprint" if vehicle.footprint else f"for a robot radius of {vehicle.robot_radius:g} m"
+    return (f"{file} {'passes' if found.ok else count}: length {verdict.length:.3f} m, least clearance "
+            f"{found.min_clearance:.4f} m {need}, greatest curvature {found.max_curvature:.4f} 1/m for a turning radius of "
+            f"{vehicle.turning_radius:g} m.")
+
+
+def _document(verdict: Verdict, map_name: str) -> dict[str, Any]:
+    """The verdict as what JSON can hold."""
+    problem, found = verdict.problem, verdict.audit
+    figures = {"length": verdict.length, "min_clearance": found.min_clearance, "max_curvature": found.max_curvature}
+    return {"ok": found.ok, "findings": list(found.findings),
+            **{name: figure if math.isfinite(figure) else None for name, figure in figures.items()},
+            "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
+            "vehicle": values(problem.vehicle), "request": values(problem), "version": __version__}
