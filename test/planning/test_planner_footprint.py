@@ -1,0 +1,99 @@
+"""plan() for polygon footprints: what a disc around the vehicle could not do, and what no vehicle can."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+from cases import SCALE, needs_compiled
+
+from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, audit, load_map, plan
+from dubins_rrt_ros.share import maps_directory
+
+ROBOT = "[[0.6, 0.3], [-0.6, 0.3], [-0.6, -0.3], [0.6, -0.3]]"
+CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
+SAMPLES = 1000 if SCALE == 1 else 40
+
+
+def checked(problem, **settings):
+    """The plan, its path judged again and its tree's edges with it."""
+    result = plan(problem, Settings(**{"samples": SAMPLES, "seed": 1, "planning_time": 60.0, **settings}))
+    result.check()
+    result.tree.check(ClearanceField.of(problem.map, problem.allow_unknown), problem.vehicle)
+    if result.path:
+        assert audit(result.path, problem).ok
+    return result
+
+
+def grid_with_a_gap(rows):
+    """8 m x 8 m with a wall 0.4 m thick across, but for some rows of 0.05 m."""
+    data = np.zeros((160, 160))
+    data[:, 76:84] = 100
+    data[rows, 76:84] = 0
+    return GridMap(data, 0.05)
+
+
+def polygons_with_a_gap(width):
+    wall = shapely.box(3.8, 0, 4.2, 8) - shapely.box(3.7, 4 - width / 2, 4.3, 4 + width / 2)
+    return PolygonMap(shapely.box(0, 0, 8, 8) - wall)
+
+
+@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+@pytest.mark.parametrize("map", [grid_with_a_gap(slice(72, 88)), polygons_with_a_gap(0.8)], ids=["grid", "polygons"])
+def test_a_long_vehicle_drives_through_a_gap_that_its_disc_does_not(map, planner):
+    """0.6 m wide and 1.2 m long, through 0.8 m."""
+    vehicle = Vehicle(turning_radius=0.8, footprint=ROBOT)
+    result = checked(Problem(map, vehicle, (1.5, 2.0, 0.0), (6.5, 6.0, 0.0)), planner=planner)
+    assert result.status == Status.NONE, result.message
+    assert 0 < result.min_clearance < 0.1
+    assert result.length >= result.lower_bound
+    disc = Vehicle(turning_radius=0.8, robot_radius=vehicle.robot_radius)
+    assert checked(Problem(map, disc, (1.5, 2.0, 0.0), (6.5, 6.0, 0.0)), planner=planner).status == Status.NO_VALID_PATH
+
+
+@pytest.mark.parametrize("width, status", [(0.602, Status.NONE), (0.599, Status.NO_VALID_PATH)])
+def test_a_gap_that_just_passes_and_just_fails(width, status):
+    """Straight on, as no other way leads through."""
+    problem = Problem(polygons_with_a_gap(width), Vehicle(turning_radius=0.8, footprint=ROBOT), (1.5, 4.0, 0.0), (6.5, 4.0, 0.0))
+    assert checked(problem, samples=100).status == status
+
+
+@needs_compiled
+@pytest.mark.parametrize("seed", range(5))
+def test_a_car_parks_forward_between_two_others(seed):
+    file = maps_directory() / "parking.geojson"
+    start, goal = (json.loads(file.read_text())[name] for name in ("start", "goal"))
+    problem = Problem(load_map(file), Vehicle(turning_radius=5.0, footprint=CAR), start, goal)
+    result = checked(problem, samples=3000, seed=seed)
+    assert result.status == Status.NONE, result.message
+    assert result.gap < 0.02
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_the_goal_must_hold_the_whole_footprint(kind):
+    """Its reference point has room enough, its corners have not."""
+    map = grid_with_a_gap(slice(72, 88)) if kind == "grid" else polygons_with_a_gap(0.8)
+    vehicle = Vehicle(turning_radius=0.8, footprint=ROBOT)
+    across, along = (plan(Problem(map, vehicle, (5.5, 2.0, 0.0), (6.5, 0.35, theta)), Settings(samples=5, seed=1))
+                     for theta in (math.pi / 2, 0.0))
+    assert across.status == Status.GOAL_OCCUPIED
+    assert "the footprint touches the map's edge at (" in across.message
+    assert along.status != Status.GOAL_OCCUPIED
+
+
+@pytest.mark.parametrize("options", [{"informed": False}, {"shortcut": False}, {"step_size": 1.0},
+                                     {"informed": False, "step_size": 1.0}])
+def test_the_other_ways_to_search_know_the_footprint_too(options):
+    vehicle = Vehicle(turning_radius=0.8, footprint=ROBOT)
+    problem = Problem(polygons_with_a_gap(1.6), vehicle, (1.5, 2.0, 0.0), (6.5, 6.0, 0.0), goal_tolerance_xy=0.3,
+                      any_goal_heading=True)
+    result = checked(problem, **options)
+    assert result.status == (Status.NONE if SCALE == 1 else result.status), result.message
+
+
+def test_a_seed_determines_the_path_whatever_ran_before():
+    problem = Problem(grid_with_a_gap(slice(72, 88)), Vehicle(0.8, footprint=ROBOT), (1.5, 2.0, 0.0), (6.5, 6.0, 0.0))
+    first, _, again = (plan(problem, Settings(samples=SAMPLES, seed=seed, planning_time=60.0)) for seed in (3, 4, 3))
+    assert first.length == again.length
+    assert first.tree.poses.tobytes() == again.tree.poses.tobytes()
