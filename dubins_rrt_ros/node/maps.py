@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from dubins_rrt_ros.planning import GridMap, Map, MapError, MapMetadataError, MapNotFound, Vehicle, load_map, prepare
+from dubins_rrt_ros.planning.footprint import summary
 from dubins_rrt_ros.share import find_map
 
 from .conversions import as_grid, grid_from, grid_message
@@ -174,7 +175,9 @@ class Maps:
         if isinstance(outcome, Exception):
             raise outcome
         if outcome is self._preparation:
-            self._node.get_logger().info(f"The map is ready, id {outcome.map.id}")
+            outline = self._parameters.read().vehicle.outline
+            vehicle = f", for {summary(outline)}" if outline else ""
+            self._node.get_logger().info(f"The map is ready, id {outcome.map.id}{vehicle}")
             self._tell_prepared()
 
     def _post(self, receiver: Callable, outcome: object) -> None:

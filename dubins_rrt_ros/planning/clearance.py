@@ -1,8 +1,9 @@
 """Exact distance to the nearest obstacle, computed once per map; everything outside the map is an obstacle.
 
-Guaranteed: a curve that `curve_is_free` accepts keeps the needed clearance everywhere, between samples too, and one that keeps
-MARGIN more is always accepted (`_kernels/clearance.py` has the proof). The distances are those to the squares of occupied
-cells, or to polygons, in double precision.
+Guaranteed: along a curve that `curve_is_free` accepts the vehicle touches no obstacle anywhere, between samples too, and keeps a
+quarter of MARGIN from them; a curve along which it keeps MARGIN (a disc) or sqrt(2) of that (a polygon) is always accepted.
+`_kernels/clearance.py` and `_kernels/body.py` have the proofs. The distances are those to the squares of occupied cells, or to
+polygons, in double precision; nothing is rounded to cells.
 """
 
 import math

@@ -46,6 +46,13 @@ def cover(outline: Outline) -> Cover:
     return Cover(discs, float(shapely.distance(polygon, shapely.points(_rims(discs))).max()), np.concatenate(parts), first_corner)
 
 
+def summary(outline: Outline) -> str:
+    """What covers a footprint, in words."""
+    found = cover(outline)
+    return (f"a footprint of {len(outline)} corners, covered by {len(found.discs)} discs that reach {found.excess:.2f} m beyond "
+            "it (nearer to obstacles than that, the footprint itself decides)")
+
+
 def _rims(discs: np.ndarray) -> np.ndarray:
     """(m, RIM, 2) points on the rims of discs."""
     bearing = np.linspace(0, math.tau, RIM)

@@ -12,6 +12,7 @@ from .audit import Audit, audit
 from .bounds import lower_bound
 from .clearance import ClearanceField
 from .distance import DistanceField, free_blocks
+from .footprint import cover
 from .headings import FOLLOW_FIELD
 from .map import Map
 from .path import Path
@@ -39,6 +40,8 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: M
     field = ClearanceField.of(map, allow_unknown, previous)
     field.components(vehicle.inner_radius)
     free_blocks(field, vehicle.inner_radius)
+    if vehicle.outline:
+        cover(vehicle.outline)
 
 
 def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = lambda: False,

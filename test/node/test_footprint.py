@@ -1,0 +1,37 @@
+"""A footprint as the node's parameter: a parked car, and a pose that a disc could take and the footprint cannot."""
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from harness import poses_of
+
+CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
+ENTRY, BAY, ACROSS = (2.5, 8.75, 0.0), (22.0, 4.1, -1.5708), (5.0, 9.0, 1.5708)
+
+
+@pytest.fixture(scope="module")
+def running(module_planners):
+    process = module_planners.start(map_file="parking.geojson", turning_radius=5.0, footprint=CAR, seed=1, planning_time=15.0)
+    return process, module_planners.client()
+
+
+def test_a_car_is_parked_over_the_network(running):
+    process, client = running
+    client.wait_for(lambda: "covered by 10 discs that reach 0.19 m beyond it" in process.output, "the cover to be told")
+    path, told = client.plan(ENTRY, BAY)
+    assert told["error_name"] == "NONE", told["message"]
+    assert told["audit"] == "ok"
+    assert 0 < float(told["min_clearance"]) < 0.1
+    assert poses_of(path)[-1, :2].tolist() == list(BAY[:2])
+
+
+def test_the_pose_must_hold_the_whole_car(running):
+    """Its rear axle has room there, its front overlaps a parked car."""
+    _, client = running
+    _, told = client.plan(ACROSS, BAY)
+    assert told["error_name"] == "START_OCCUPIED"
+    assert told["message"].startswith("Start is occupied: the footprint touches an obstacle at (")
+    client.set_parameters(footprint="", robot_radius=0.9)
+    _, told = client.plan(ACROSS, BAY)
+    assert told["message"].startswith("No path found: "), told["message"]
