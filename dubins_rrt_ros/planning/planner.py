@@ -189,9 +189,11 @@ class _Request:
                           min_clearance=verdict.min_clearance, max_curvature=verdict.max_curvature)
         return replace(plan, message=_success_message(plan, running))
 
-    def _plan(self, status: Status, message: str, tree: Tree, **more) -> Plan:
-        return Plan(status, message, self._problem, self._settings, tree, time_to_first=self._time_to_first,
-                    planning_time=self._elapsed, map_time=self._map_time, lower_bound=self._bound, **more)
+    def _plan(self, status: Status, message: str, tree: Tree, path: Path | None = None, **more) -> Plan:
+        # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
+        bound = self._bound if path is None else min(self._bound, path.length)
+        return Plan(status, message, self._problem, self._settings, tree, path=path, time_to_first=self._time_to_first,
+                    planning_time=self._elapsed, map_time=self._map_time, lower_bound=bound, **more)
 
 
 def _success_message(plan: Plan, running: bool) -> str:

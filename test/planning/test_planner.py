@@ -172,6 +172,13 @@ def test_start_equal_to_goal(planner):
     assert result.path.poses(0.05).tolist() == [list(START)]
 
 
+def test_start_beside_the_goal_by_rounding(planner):
+    """Between two such poses the shortest curve may be a full circle, which no bound of a path of length 0 may be."""
+    result = plan(Problem(empty_map(), VEHICLE, START, (START[0] - 1e-11, START[1] + 1e-11, START[2] - 1e-11)), settings(planner))
+    result.check()
+    assert (result.length, result.lower_bound, result.gap) == (0, 0, 0)
+
+
 def test_start_within_the_tolerance(planner):
     near = (START[0] + 0.3, START[1], START[2] + 0.2)
     tolerances = {"goal_tolerance_xy": 0.31, "goal_tolerance_yaw": 0.21}

@@ -39,6 +39,7 @@ def polygons_with_a_gap(width):
     return PolygonMap(shapely.box(0, 0, 8, 8) - wall)
 
 
+@needs_compiled
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 @pytest.mark.parametrize("map", [grid_with_a_gap(slice(72, 88)), polygons_with_a_gap(0.8)], ids=["grid", "polygons"])
 def test_a_long_vehicle_drives_through_a_gap_that_its_disc_does_not(map, planner):
@@ -52,6 +53,7 @@ def test_a_long_vehicle_drives_through_a_gap_that_its_disc_does_not(map, planner
     assert checked(Problem(map, disc, (1.5, 2.0, 0.0), (6.5, 6.0, 0.0)), planner=planner).status == Status.NO_VALID_PATH
 
 
+@needs_compiled
 @pytest.mark.parametrize("width, status", [(0.602, Status.NONE), (0.599, Status.NO_VALID_PATH)])
 def test_a_gap_that_just_passes_and_just_fails(width, status):
     """Straight on, as no other way leads through."""
@@ -92,6 +94,7 @@ def test_the_other_ways_to_search_know_the_footprint_too(options):
     assert result.status == (Status.NONE if SCALE == 1 else result.status), result.message
 
 
+@needs_compiled
 def test_a_seed_determines_the_path_whatever_ran_before():
     problem = Problem(grid_with_a_gap(slice(72, 88)), Vehicle(0.8, footprint=ROBOT), (1.5, 2.0, 0.0), (6.5, 6.0, 0.0))
     first, _, again = (plan(problem, Settings(samples=SAMPLES, seed=seed, planning_time=60.0)) for seed in (3, 4, 3))

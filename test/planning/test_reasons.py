@@ -345,8 +345,7 @@ def test_a_footprint_that_touches_is_told_where(turned, status):
     """Lengthwise it fits between the wall and the map's edge, across it does not."""
     map = PolygonMap(shapely.box(0, 0, 10, 10) - shapely.box(1, 2, 1.2, 8))
     problem = Problem(map, Vehicle(0.5, footprint=FOOTPRINT), (0.5, 5.0, turned), (8.0, 5.0, 0.0))
-    result = plan(problem, Settings(samples=50, seed=1))
-    assert result.status == (status or result.status)
+    result = plan(problem, Settings(samples=5, seed=1, informed=False))
     assert (result.status == Status.START_OCCUPIED) == (status is not None)
     if status:
         assert result.message.startswith("Start is occupied: the footprint touches ")
