@@ -36,12 +36,17 @@ def check_cover(outline):
 
 def check_parts(found, polygon):
     """Together the convex parts are the polygon; made wider they hold it made wider, and reach at most sqrt(2) as far."""
+    corners = np.array(polygon.exterior.coords)
+    rim = (corners[:-1, None] + np.linspace(0, 1, 12)[:, None] * np.diff(corners, axis=0)[:, None]).reshape(-1, 1, 2)
+    bearing = np.linspace(0, math.tau, 73)
     for wider in (0.0, 0.01, 1.0):
         rings = [ring[:, :2] + wider * ring[:, 2:] for ring in np.split(found.corners, found.first_corner[1:-1])]
         parts = shapely.union_all([shapely.convex_hull(shapely.MultiPoint(ring)) for ring in rings])
         tolerance = 1e-9 + 1e-6 * wider
-        assert polygon.buffer(wider, 64).difference(parts.buffer(tolerance)).area < 1e-9
-        assert parts.difference(polygon.buffer(math.sqrt(2) * wider * 1.001 + tolerance, 64)).area < 1e-9
+        within = (rim + wider * np.column_stack([np.cos(bearing), np.sin(bearing)])).reshape(-1, 2)
+        assert shapely.distance(parts, shapely.points(within)).max() <= tolerance
+        assert shapely.distance(polygon, shapely.points(shapely.get_coordinates(parts))).max() <= math.sqrt(2) * wider + tolerance
+        assert polygon.difference(parts.buffer(1e-9)).area < 1e-9
         for ring in rings:
             assert shapely.Polygon(ring).area == pytest.approx(shapely.convex_hull(shapely.MultiPoint(ring)).area, rel=1e-9)
             assert shapely.LinearRing(ring).is_ccw
