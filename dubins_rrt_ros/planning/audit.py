@@ -40,17 +40,17 @@ class Audit:
 
 def audit(path: Path, problem: Problem) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance."""
-    if broken := _broken_parts(path):
+    if broken := broken_parts(path):
         return Audit(broken, 0.0, math.inf)
-    starts, ends, arcs = _drive(path)
+    starts, ends, arcs = driven_arcs(path)
     too_near, least = clearance_findings(arcs, problem)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
-                *_turn_findings(path, problem), *too_near)
+                *turn_findings(path, problem), *too_near)
     turning = [curve.radius for curve in path.curves if _turns(curve)]
     return Audit(findings, least, 1 / min(turning) if turning else 0.0)
 
 
-def _broken_parts(path: Path) -> tuple[str, ...]:
+def broken_parts(path: Path) -> tuple[str, ...]:
     """A sentence for each pose that is none and each curve that cannot be driven."""
     poses = [f"the path's {name} is {pose}" for name, pose in (("start", path.start), ("end", path.end))
              if not all(map(math.isfinite, pose))]
@@ -64,7 +64,7 @@ def _turns(curve) -> bool:
     return any(length > 0 and turn != "S" for turn, length in zip(curve.word, curve.lengths, strict=True))
 
 
-def _drive(path: Path) -> tuple[np.ndarray, np.ndarray, Arcs]:
+def driven_arcs(path: Path) -> tuple[np.ndarray, np.ndarray, Arcs]:
     """Starts and ends of the curves, (n, 3) each, and all their arcs; a path without curves is one arc of length 0."""
     signs = {"L": 1.0, "S": 0.0, "R": -1.0}
     starts = np.array([curve.start for curve in path.curves]).reshape(-1, 3)
@@ -105,7 +105,7 @@ def _joint_findings(path: Path, starts: np.ndarray, ends: np.ndarray) -> list[st
     return findings
 
 
-def _turn_findings(path: Path, problem: Problem) -> list[str]:
+def turn_findings(path: Path, problem: Problem) -> list[str]:
     least = problem.vehicle.turning_radius
     findings = []
     for i, curve in enumerate(path.curves):

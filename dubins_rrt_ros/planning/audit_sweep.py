@@ -99,22 +99,22 @@ def _least_clearance(arcs: Arcs, problem: Problem, need: float) -> _Least:
     """The least clearance, where it is, and whether no piece can hide contact."""
     map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
     if not outline:
-        return _narrow_down(arcs, _Disc(obstacles_of(map, unknown)), need)
+        return _narrow_down(arcs, Disc(obstacles_of(map, unknown)), need)
     if not isinstance(map, GridMap):
-        return _narrow_down(arcs, _Outline(outline, obstacles_of(map, unknown)), need)
+        return _narrow_down(arcs, Outline(outline, obstacles_of(map, unknown)), need)
     reach = FIRST_CELLS * map.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)
     x, y, _ = arcs.at(index, begin)
     while True:
         squares = PathsideSquares(map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach)
-        found = _narrow_down(arcs, _Outline(outline, squares), need)
+        found = _narrow_down(arcs, Outline(outline, squares), need)
         if found[0] < squares.reach:
             return found
         reach *= 4
 
 
-class _Disc:
+class Disc:
     """A vehicle that is a disc, as the point in its middle."""
 
     def __init__(self, obstacles: Obstacles):
@@ -130,7 +130,7 @@ class _Disc:
         return (at_begin + at_end - size) / 2
 
 
-class _Outline:
+class Outline:
     """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor."""
 
     def __init__(self, corners: tuple[tuple[float, float], ...], obstacles: PolygonObstacles | PathsideSquares):
@@ -175,7 +175,7 @@ class _Outline:
         return np.nonzero(kept)[0], parts[kept]
 
 
-def _narrow_down(arcs: Arcs, vehicle: _Disc | _Outline, need: float) -> _Least:
+def _narrow_down(arcs: Arcs, vehicle: Disc | Outline, need: float) -> _Least:
     """The least clearance, where it is, and whether no piece can hide contact: they are halved until that is so."""
     index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
 

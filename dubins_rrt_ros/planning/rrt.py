@@ -52,9 +52,10 @@ BLOCK = 512
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
 #: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
-EXPANSIONS, MOST_FIRST, MOST_SECOND = (1024, 32_768, 4096) if COMPILED else (128, 512, 128)
-#: After a block the search waits for so many poses at most that it expanded beside it.
-EXPANSIONS_BESIDE = 1024
+EXPANSIONS, MOST_FIRST, MOST_SECOND = (128, 32_768, 4096) if COMPILED else (32, 512, 128)
+#: After a block the search waits for so many poses at most that it expanded beside it: for a disc, and for a polygon, which takes
+#: several times as long.
+EXPANSIONS_BESIDE, EXPANSIONS_BESIDE_OF_POLYGON = 1024, 128
 #: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
 POLISHINGS, WORTH_MORE = 3, 1e-4
 #: Nodes are forgotten when the best path became shorter by this share of its length.
@@ -229,7 +230,8 @@ class Search:
             self._take(self._portion())
             self._portion = None
         if not self._runs.exhausted:
-            self._portion = self._beside.start(self._runs.run, EXPANSIONS_BESIDE, self.length)
+            expansions = EXPANSIONS_BESIDE_OF_POLYGON if self._problem.vehicle.outline else EXPANSIONS_BESIDE
+            self._portion = self._beside.start(self._runs.run, expansions, self.length)
 
     def _adopt(self, chain: Chain, end: int = -1) -> None:
         """Add a path to the tree; `end` is the node at its end, if the tree has it."""

@@ -1,0 +1,194 @@
+"""`dubins_rrt campaign`: it is clean on the planner as it is, and finds what is planted."""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import needs_compiled
+
+from dubins_rrt_ros.cli import campaign_judge, campaign_problems
+from dubins_rrt_ros.cli.campaign_judge import Task, judged
+from dubins_rrt_ros.cli.campaign_problems import Trial, random_trial
+from dubins_rrt_ros.cli.campaign_runs import results
+from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner, reasons
+from dubins_rrt_ros.planning._kernels.body import Body
+from dubins_rrt_ros.planning.reasons import Reason
+
+START, GOAL, STRAIGHT_ON = (1.0, 1.0, 0.0), (9.0, 6.0, 0.0), (1.0, 6.0, 0.0)
+
+
+def walled_trial(fits=None, start=START, turning_radius=0.5, walled_off=False, **settings):
+    """A problem with a wall between start and goal, beside which 2 m are open, or none."""
+    data = np.zeros((14, 20))
+    data[:14 if walled_off else 10, 9:11] = 100
+    problem = Problem(GridMap(data, 0.5), Vehicle(turning_radius, 0.4), start, GOAL)
+    return Trial("walled", problem, Settings(**{"samples": 60, "planning_time": 60.0, "seed": 1, **settings}), fits)
+
+
+def findings_of(trial, monkeypatch, number=0):
+    """What the judge finds wrong with the planner's answer to a problem."""
+    monkeypatch.setattr(campaign_judge, "random_trial", lambda seed, number: trial)
+    return judged(Task(0, number))["findings"]
+
+
+def contents(trial):
+    problem = trial.problem
+    return trial.kind, trial.fits, trial.settings, problem.map.id, problem.vehicle, problem.start, problem.goal
+
+
+def run(*argv, capsys):
+    status = main(["campaign", *argv])
+    return status, *capsys.readouterr()
+
+
+@needs_compiled
+def test_the_planner_is_right(tmp_path, capsys):
+    file = tmp_path / "lines.jsonl"
+    status, out, error = run("--problems", "25", "--out", str(file), capsys=capsys)
+    assert (status, error) == (0, "") and "; 0 disagreements\n" in out
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    assert [line["number"] for line in lines] == list(range(25)) and not any(line["findings"] for line in lines)
+    assert all(Status[line["status"]] in Status for line in lines)
+    assert "25 problems of seed 0 in " in out and f" {sum(line['edges'] for line in lines)} edges of trees and 150 other" in out
+    assert len({line["kind"] for line in lines}) > 5 and {"NONE", "NO_VALID_PATH"} < {line["status"] for line in lines}
+
+
+@needs_compiled
+def test_any_number_of_processes_judges_the_same(tmp_path, capsys):
+    def lines(jobs):
+        file = tmp_path / f"{jobs}.jsonl"
+        assert run("--problems", "6", "--first", "50", "--jobs", jobs, "--out", str(file), capsys=capsys)[0] == 0
+        found = sorted((json.loads(line) for line in file.read_text().splitlines()), key=lambda line: line["number"])
+        return [(line["number"], line["kind"], line["status"], line["edges"], line["length"]) for line in found]
+
+    assert lines("1") == lines("3")
+
+
+def test_a_number_gives_the_same_problem():
+    for number in range(40):
+        assert contents(random_trial(3, number)) == contents(random_trial(3, number))
+    assert contents(random_trial(3, 0)) != contents(random_trial(4, 0)) != contents(random_trial(4, 1))
+
+
+@pytest.mark.parametrize("kind", campaign_problems.KINDS)
+def test_each_kind_of_problem_can_be_planned(kind):
+    found = [campaign_problems.KINDS[kind](np.random.default_rng(seed)) for seed in range(10)]
+    assert all(isinstance(trial.problem, Problem) for trial in found)
+    assert {trial.fits for trial in found} == {"gap": {True, False}, "corner": {True, None}}.get(kind, {None})
+
+
+@pytest.mark.parametrize("informed", [True, False])
+def test_a_collision_check_that_is_too_easy_is_found(informed, monkeypatch):
+    monkeypatch.setattr(ClearanceField, "body", lambda field, vehicle: Body(field.kernel, vehicle.robot_radius / 2))
+    found = " ".join(findings_of(walled_trial(informed=informed), monkeypatch))
+    assert "the tree's edges: along curve " in found and "less than the robot's radius, 0.4 m" in found
+
+
+def test_a_collision_check_that_is_too_strict_is_found(monkeypatch):
+    monkeypatch.setattr(ClearanceField, "body", lambda field, vehicle: Body(field.kernel, vehicle.robot_radius + 0.65))
+    found = " ".join(findings_of(walled_trial(start=STRAIGHT_ON), monkeypatch))
+    assert "the planner holds DubinsCurve(" in found and "to touch something, but the gap is 0.58" in found  # 0.6 less 2 % of 1
+
+
+@pytest.mark.parametrize("status, message, finding", [
+    (Status.START_OCCUPIED, "Start is occupied.", "START_OCCUPIED, but the vehicle has 0.600000 m to spare there"),
+    (Status.GOAL_OCCUPIED, "Goal is occupied.", "GOAL_OCCUPIED, but the vehicle has "),
+    (Status.START_OUTSIDE_MAP, "Start is outside.", "START_OUTSIDE_MAP, but it is in the map"),
+    (Status.NO_VALID_PATH, "No path exists: walls.", "a way leads from start to goal, but: No path exists: walls."),
+    (Status.NO_VALID_PATH, "No path found: yet.", "it gave up after 0 of 60 samples"),
+    (Status.TIMEOUT, "No time.", "s, the limit being 60 s"),
+    (Status.UNKNOWN, "A defect.", "UNKNOWN: A defect."),
+])
+def test_a_false_status_is_found(status, message, finding, monkeypatch):
+    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Reason(status, message))
+    assert finding in " ".join(findings_of(walled_trial(), monkeypatch))
+
+
+@pytest.mark.parametrize("name, pose", [("start", (5.0, 1.0, 0.0)), ("goal", (5.0, 1.0, 0.0)), ("goal", (10.5, 1.0, 0.0))])
+def test_a_pose_that_should_have_been_refused_is_found(name, pose, monkeypatch):
+    trial = walled_trial()
+    trial = replace(trial, problem=replace(trial.problem, **{name: pose}))
+    assert findings_of(trial, monkeypatch) == []
+    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Reason(Status.NO_VALID_PATH, "No path exists: x."))
+    assert f"NO_VALID_PATH, but at the {name} the vehicle has no room: -0.4" in " ".join(findings_of(trial, monkeypatch))
+
+
+def test_what_the_maker_of_a_problem_knows_counts(monkeypatch):
+    assert "it found a path where there is none" in findings_of(walled_trial(fits=False), monkeypatch)
+    found, = findings_of(walled_trial(fits=True, walled_off=True), monkeypatch)
+    assert found.startswith("a way leads from start to goal, but: No path exists: walls separate ")
+    found, = findings_of(walled_trial(fits=True, start=(7.0, 1.0, 0.0), turning_radius=9.0), monkeypatch)
+    assert found.startswith("the shortest curve leads to the goal, but: No path found: 60 of 60 samples drawn")
+
+
+def test_an_exception_is_found_and_told_with_the_command_that_repeats_it(monkeypatch, capsys):
+    def fail(problem, field):
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(planner.reasons, "before_search", fail)
+    status, out, _ = run("--problems", "2", "--first", "7", "--seed", "3", capsys=capsys)
+    assert status == 1 and "2 problems of seed 3" in out and "2 disagreements" in out
+    assert "repeat it with `dubins_rrt campaign --seed 3 --first 8 --problems 1`:\n  ZeroDivisionError in fail" in out
+
+
+def test_a_broken_invariant_is_found(monkeypatch):
+    answer = replace(plan(walled_trial().problem, walled_trial().settings), samples=-1)
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: answer)
+    assert "PlanError: -1 samples were drawn of 60" in findings_of(walled_trial(), monkeypatch)
+
+
+def test_an_answer_that_comes_late_is_found(monkeypatch):
+    def late(problem, settings):
+        end = time.process_time() + 1.5
+        while time.process_time() < end:
+            pass
+        return replace(plan(problem, settings), planning_time=1.6)
+
+    monkeypatch.setattr(campaign_judge, "plan", late)
+    assert "it took 1.6 s, the limit being 0.5 s" in findings_of(walled_trial(planning_time=0.5), monkeypatch)
+
+
+def test_a_lower_bound_that_is_none_is_found(monkeypatch):
+    answers = iter([replace(plan(walled_trial().problem, walled_trial().settings), lower_bound=bound)
+                    for bound in (1.0, 50.0)])
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: next(answers))
+    found, = (finding for finding in findings_of(walled_trial(), monkeypatch, number=1) if "PlanError" not in finding)
+    assert found.startswith("50.000000 m is said to be a lower bound, but there is a path of 1")
+
+
+def test_an_answer_that_changes_is_found(monkeypatch):
+    plans = iter([plan(walled_trial(seed=seed).problem, walled_trial(seed=seed).settings) for seed in (1, 2)])
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: next(plans))
+    assert "planned again it came to NONE, and to another tree or path" in findings_of(walled_trial(), monkeypatch)
+
+
+def test_a_process_that_dies_or_hangs_is_told_and_replaced():
+    dies, hangs = "__import__('os')._exit(3)", "__import__('time').sleep(3600)"
+    found = list(results(eval, ["1", dies, "2", hangs, "3", "4"], 2, 8.0, lambda task, what: (task, what)))
+    assert len(found) == 6 and {1, 2, 3, 4} < set(found)
+    assert {(dies, "the process died with status 3"), (hangs, "no answer within 8 s")} < set(found)
+
+
+def test_after_ctrl_c_what_was_done_is_told(monkeypatch, capsys):
+    def interrupted(task):
+        if task.number == 2:
+            raise KeyboardInterrupt
+        return judged(task)
+
+    monkeypatch.setattr("dubins_rrt_ros.cli.campaign.judged", interrupted)
+    status, out, error = run("--problems", "5", capsys=capsys)
+    assert status == 130 and "2 problems of seed 0" in out and error == "dubins_rrt campaign: interrupted\n"
+
+
+@pytest.mark.parametrize("argv, words", [
+    (["--problems", "0"], "--problems is 0; give 1 or more"), (["--seed", "-1"], "--seed is -1; give 0 or more"),
+    (["--jobs", "0"], "--jobs is 0"), (["--first", "-3"], "--first is -3"),
+    (["--out", "none/x.jsonl"], "there is no folder none")])
+def test_wrong_usage_is_refused(argv, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    status, out, error = run(*argv, capsys=capsys)
+    assert status == 2 and out == "" and words in error and not list(Path().iterdir())
