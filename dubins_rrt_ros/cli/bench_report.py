@@ -45,8 +45,9 @@ def ratio(cost: float, best: Best) -> float:
 
 def summary(runs: Runs) -> str:
     """A line for each problem: how many runs are solved, and the medians."""
-    return "\n".join(f"{problem}: {_solved(group)} solved, first path {_ms(median(run.first[0] for run in group))} ms, "
-                     f"{_metres(median(run.cost for run in group))} m"
+    return "\n".join(f"{problem}: {_solved(group)} solved, "
+                     f"first path {milliseconds(median(run.first[0] for run in group))} ms, "
+                     f"{metres(median(run.cost for run in group))} m"
                      for problem, planners in runs.items() for group in planners.values())
 
 
@@ -55,7 +56,7 @@ def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
     marks = marks_of(runs)
     parts = ["# Planners compared", EXPLANATION.strip(), "## All problems", _overview(runs, best, marks)]
     for problem, planners in runs.items():
-        parts += [f"## {problem}", f"Best known: {_metres(best[problem].cost, 4)} m, {best[problem].source}.",
+        parts += [f"## {problem}", f"Best known: {metres(best[problem].cost, 4)} m, {best[problem].source}.",
                   _problem_table(planners, best[problem], marks)]
     return "\n\n".join(parts) + "\n"
 
@@ -65,7 +66,7 @@ def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> str:
     head = ["planner", "solved runs", "problems solved in the median", "first path [ms]",
             *(f"cost / best known at {mark:g} s" for mark in marks)]
     note = "The last columns are geometric means over the problems, of medians; (k/n): only k of the n problems have one."
-    return note + "\n\n" + _table(head, [_overview_row(name, runs, best, marks) for name in names])
+    return note + "\n\n" + table(head, [_overview_row(name, runs, best, marks) for name in names])
 
 
 def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> list[str]:
@@ -75,7 +76,7 @@ def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: lis
     at_marks = ([ratio(median(run.cost_at(mark) for run in group), best[problem]) for problem, group in groups.items()]
                 for mark in marks)
     return [planner, _solved([run for group in groups.values() for run in group]), f"{solved}/{len(runs)}",
-            _mean(first, len(runs), _ms), *(_mean(ratios, len(runs), "{:.4f}".format) for ratios in at_marks)]
+            _mean(first, len(runs), milliseconds), *(_mean(ratios, len(runs), "{:.4f}".format) for ratios in at_marks)]
 
 
 def _mean(values: list[float], problems: int, show: Callable[[float], str]) -> str:
@@ -90,18 +91,18 @@ def _mean(values: list[float], problems: int, show: Callable[[float], str]) -> s
 def _problem_table(planners: Mapping[str, list[Run]], best: Best, marks: list[float]) -> str:
     head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks),
             *(f"{100 * share:g} % above best [ms]" for share in SHARES)]
-    return _table(head, [_problem_row(planner, group, best, marks) for planner, group in planners.items()])
+    return table(head, [_problem_row(planner, group, best, marks) for planner, group in planners.items()])
 
 
 def _problem_row(planner: str, group: list[Run], best: Best, marks: list[float]) -> list[str]:
     *early, last = ([run.cost_at(mark) for run in group] for mark in marks)
     reach = ((1 + share) * best.cost for share in SHARES)
-    return [planner, _solved(group), _spread([run.first[0] for run in group], _ms),
-            _metres(median(run.first[1] for run in group)), *(_metres(median(costs)) for costs in early), _spread(last, _metres),
-            *(_ms(median(run.time_to(cost) for run in group)) for cost in reach)]
+    return [planner, _solved(group), spread([run.first[0] for run in group], milliseconds),
+            metres(median(run.first[1] for run in group)), *(metres(median(costs)) for costs in early), spread(last, metres),
+            *(milliseconds(median(run.time_to(cost) for run in group)) for cost in reach)]
 
 
-def _spread(values: list[float], show: Callable[[float], str]) -> str:
+def spread(values: list[float], show: Callable[[float], str]) -> str:
     """Median and quartiles."""
     low, middle, high = (show(quantile(values, share)) for share in (0.25, 0.5, 0.75))
     return middle if low == high == "-" else f"{middle} [{low}, {high}]"
@@ -111,18 +112,20 @@ def _solved(group: list[Run]) -> str:
     return f"{sum(run.solved for run in group)}/{len(group)}"
 
 
-def _metres(value: float, digits: int = 2) -> str:
+def metres(value: float, digits: int = 2) -> str:
+    """Digits after the point, or a dash."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
-def _ms(seconds: float) -> str:
+def milliseconds(seconds: float) -> str:
     """Milliseconds with three digits, or all where there are more."""
     if math.isinf(seconds):
         return "-"
     return f"{1000 * seconds:.3g}" if seconds < 0.9995 else f"{1000 * seconds:.0f}"
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
     lines = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
     lines.insert(1, ["---"] * len(head))
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -6,7 +6,7 @@ from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
 from dubins_rrt_ros.planning.plan_file import PlanFileError
 
-from . import audit, bench, campaign, demo, plan, render
+from . import audit, bench, campaign, demo, paper, plan, render
 from .flags import Parser, UsageError, guard_numbers
 
 SUCCESS, NO_PATH, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
@@ -38,7 +38,7 @@ def _parser() -> Parser:
                     description="Plans paths for a vehicle that drives forward and cannot turn on the spot.")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in (plan, audit, bench, campaign, demo, render):
+    for command in (plan, audit, bench, campaign, demo, paper, render):
         command.add_to(subparsers)
     return parser
 
