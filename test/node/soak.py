@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
 from dubins_rrt_ros.node.parameters import OPTIONS
-from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, Path, Problem, Vehicle, audit, load_map, options
+from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, Map, Path, Problem, Vehicle, audit, load_map, options
 from dubins_rrt_ros.share import find_map
 
 #: The package's own maps, both kinds; and what load_map refuses.
@@ -69,7 +69,7 @@ class Soak:
         self._values = dict(self._defaults)
         self._earlier, self._in_force = [], [self._values]  # the parameters in the step before, and in this one
         self._own_maps = [load_map(find_map(name)) for name in OWN_MAPS]
-        self._sent_maps: deque[GridMap] = deque(maxlen=20)
+        self._sent_maps: deque[GridMap] = deque(maxlen=50)
         self._map = self._own_maps[0]  # where poses are drawn
         self._starts: deque[tuple] = deque(maxlen=1000)
         self._goals: deque[tuple] = deque(maxlen=1000)
@@ -328,15 +328,20 @@ class Soak:
             assert () in findings, f"a path of {length} m on map {told['map_id']}: {findings}"
 
     def _status_of(self, length: float) -> dict | None:
-        """The newest status of a path of this length."""
+        """The newest status of a path of this length, on a map that is kept: an older one tells of another path as long."""
         self._hear()
-        return next((told for told in reversed(self._told) if abs(float(told["path_length"]) - length) <= SAME), None)
+        return next((told for told in reversed(self._told)
+                     if abs(float(told["path_length"]) - length) <= SAME and self._map_of(told)), None)
+
+    def _map_of(self, told: dict) -> Map | None:
+        """The map that a status tells of, if it is kept."""
+        return next((one for one in (*self._own_maps, *self._sent_maps) if one.id == told["map_id"]), None)
 
     def _findings(self, path: Path, told: dict, values: dict) -> tuple[str, ...]:
         """What the audit finds of a path for the vehicle of these parameters."""
         vehicle = Vehicle(**{item.name: values[item.name] for item in options(Vehicle)})
-        map = next(one for one in (*self._own_maps, *self._sent_maps) if one.id == told["map_id"])
-        return audit(path, Problem(map, vehicle, path.start, path.end, allow_unknown=values["allow_unknown"])).findings
+        problem = Problem(self._map_of(told), vehicle, path.start, path.end, allow_unknown=values["allow_unknown"])
+        return audit(path, problem).findings
 
 
 def stamped(pose: tuple[float, float, float], frame: str = "map") -> PoseStamped:
