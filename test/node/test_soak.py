@@ -23,10 +23,10 @@ pytestmark = pytest.mark.skipif(not kernels_compiled, reason="too little happens
 
 #: How often the node is brought to rest, where its resources are read.
 RESTS = 24
-#: How much more memory the node may hold in the last third of the rests than in the second [MB]; medians, as single rests differ.
-#: At rest it is always in the same state, so what differs was never given back: for the largest trees the heap grows in the first
-#: third, by some 50 MB, and hardly later, while a leak goes on once it has filled the holes: in an hour one of 25 kB/s, some 5 kB
-#: a request, is found.
+#: How much more memory the node may hold in the last third of the rests than in the second [MB], both at the least and at the
+#: most: at rest it is always in the same state, but for some 45 MB that a thread does or does not hold. For the largest trees the
+#: heap grows in the first third, by some 50 MB, and hardly later, while a leak goes on once it has filled the holes: in an hour
+#: one of 25 kB/s, some 5 kB a request, is found.
 GROWTH = 10.0
 #: How much of the node's log a failure shows [characters].
 LOG = 5000
@@ -57,7 +57,8 @@ def test_soak(planners, request, record_property):
             record_property(what, figure)
             print(f"{what}: {figure}")
     warm = RESTS // 3
-    assert np.median(memory[2 * warm:]) - np.median(memory[warm:2 * warm]) < GROWTH
+    before, last = memory[warm:2 * warm], memory[2 * warm:]
+    assert min(min(last) - min(before), max(last) - max(before)) < GROWTH
     assert set(others[warm:]) == {others[warm]}
     status, took = process.end(signal.SIGINT)
     assert (status, took < 3.0) == (0, True)
