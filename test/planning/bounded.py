@@ -1,5 +1,6 @@
 """What a reader may take and say, whatever it reads: seconds, megabytes, a result or a sentence."""
 
+import contextlib
 import resource
 import signal
 from pathlib import Path
@@ -25,7 +26,8 @@ class Bounds:
         used = int((_PROCESS / "statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + _SAFETY, self._limits[1]))
         self._before = signal.signal(signal.SIGALRM, _too_slow)
-        (_PROCESS / "clear_refs").write_text("5")  # the peak counts from here on
+        with contextlib.suppress(OSError):  # where it may not be written, only a new peak of the whole process is noticed
+            (_PROCESS / "clear_refs").write_text("5")  # the peak counts from here on
         self._peak = _peak()
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
 
