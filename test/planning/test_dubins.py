@@ -290,13 +290,26 @@ def test_lengths_of_read_only_arrays():
     assert lengths(ends, ends[::-1].copy(), 1.0).shape == (2,)
 
 
-def test_an_arc_is_no_full_circle_longer():
+@pytest.mark.parametrize("far", [10.0, 1e3, 1e5, 1e7])
+def test_an_arc_is_no_full_circle_longer(far):
     """Where the circles of both ends coincide, the direction between their centres is nothing but rounding."""
-    rng = np.random.default_rng(5)
-    for start, turn, length in zip(rng.uniform((-10, -10, -3), (10, 10, 3), (2000, 3)), rng.integers(0, 2, 2000),
-                                   rng.uniform(1e-6, 6.0, 2000), strict=True):
+    rng, count = np.random.default_rng(5), scaled(2000)
+    for start, turn, length in zip(rng.uniform((-far, -far, -3), (far, far, 3), (count, 3)), rng.integers(0, 2, count),
+                                   rng.uniform(1e-6, 6.0, count), strict=True):
         arc = DubinsCurve(tuple(start), 1.0, ("LSL", "RSR")[turn], (length, 0.0, 0.0))
-        assert shortest(arc.start, arc.end, 1.0).length <= length + 1e-9
+        assert shortest(arc.start, arc.end, 1.0).length <= length + 1e-9 * max(1.0, far / 1e5)
+
+
+@pytest.mark.parametrize("far", [10.0, 1e3, 1e5, 1e7])
+def test_what_is_left_of_a_curve_is_no_longer_than_that(far):
+    """As a step towards a goal leaves it: its pose is rounded where its coordinates are large."""
+    rng, count = np.random.default_rng(6), scaled(1000)
+    for start, goal, share in zip(rng.uniform((-far, -far, -3), (far, far, 3), (count, 3)),
+                                  rng.uniform((-20, -20, -3), (20, 20, 3), (count, 3)), rng.uniform(0, 1, count), strict=True):
+        goal[:2] += start[:2]
+        whole = shortest(tuple(start), tuple(goal), 0.5)
+        left = shortest(whole.pose_at(share * whole.length), tuple(goal), 0.5)
+        assert left.length <= (1 - share) * whole.length + 1e-6
 
 
 def test_a_limit_lets_just_the_shorter_curves_pass():
@@ -314,6 +327,6 @@ def test_a_limit_lets_just_the_shorter_curves_pass():
                     continue
                 for limit in (length * (1 + 1e-6), length * (1 - 1e-6)):
                     _, *arcs = kernel.shortest_within(x1 - x0, y1 - y0, a, math.sin(a), math.cos(a),
-                                                      b, math.sin(b), math.cos(b), radius, limit)
+                                                      b, math.sin(b), math.cos(b), radius, 0.0, limit)
                     assert (arcs[0] < 1e300) == (limit > length)
                     assert limit < length or sum(arcs) == pytest.approx(length, rel=1e-9)

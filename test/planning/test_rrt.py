@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
 
-from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map
 from dubins_rrt_ros.planning.distance import DistanceField
 from dubins_rrt_ros.planning.dubins import shortest
 from dubins_rrt_ros.planning.rrt import BLOCK, Search
@@ -118,6 +118,18 @@ def test_no_new_edge_is_longer_than_the_step(planner):
     tree = search.tree
     assert len(tree) > 50
     assert tree.lengths.sum(axis=1).max() <= 0.8 + 1e-12
+
+
+@needs_compiled
+def test_steps_lead_to_the_goal_however_far_the_origin_is():
+    """A pose that a step led to is rounded; what is left of the way must not come out a full circle longer for it."""
+    found = []
+    for x, y in ((0.0, 0.0), (4e5, 5e6)):
+        problem = Problem(GridMap(np.zeros((40, 40)), 0.5, (x - 10, y - 10, 0)), Vehicle(0.5, 0.2),
+                          (x - 8, y - 8, 0), (x + 8, y + 8, 1))
+        searches = [searched(problem, planner="rrt", step_size=0.5, seed=seed, goal_bias=0.2)[0] for seed in range(10)]
+        found.append([search.length for search in searches])
+    assert found[1] == pytest.approx(found[0], abs=1e-4)
 
 
 def test_without_a_step_size_edges_are_long():

@@ -36,6 +36,8 @@ ROUNDING = cython.declare(cython.double, 1e-12)
 NEARLY_NONE = cython.declare(cython.double, 1e-6)
 #: ... are taken as none where the end then is off by no more than this, in turning radii per turning radius of distance.
 FIT = cython.declare(cython.double, 2e-13)
+#: What a coordinate may be off by, relatively: a few roundings, as a pose that was driven to has behind it.
+COORDINATE_ERROR = cython.declare(cython.double, 1e-15)
 #: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
 COSINE_ERROR = cython.declare(cython.double, 1e-14)
 NO_CURVE = cython.declare(cython.double, 1e300)
@@ -102,14 +104,14 @@ def along(x: cython.double, y: cython.double, theta: cython.double, radius: cyth
 @cython.nogil
 @cython.exceptval(check=False)
 def fits(word: cython.int, t: cython.double, p: cython.double, q: cython.double, x: cython.double, y: cython.double,
-         theta0: cython.double, theta1: cython.double) -> cython.bint:
-    """Whether a curve that is driven from (0, 0, theta0) ends at (x, y, theta1)."""
+         theta0: cython.double, theta1: cython.double, rounding: cython.double) -> cython.bint:
+    """Whether a curve that is driven from (0, 0, theta0) ends at (x, y, theta1), where x and y are rounded by so much."""
     end_x: cython.double
     end_y: cython.double
     end_theta: cython.double
     end_x, end_y, end_theta = along(0, 0, theta0, 1, word, t, p, q, t + p + q)
     tolerance: cython.double = FIT * (1 + fabs(x) + fabs(y))
-    return (fabs(end_x - x) <= tolerance and fabs(end_y - y) <= tolerance
+    return (fabs(end_x - x) <= tolerance + rounding and fabs(end_y - y) <= tolerance + rounding
             and fabs(remainder(end_theta - theta1, TWO_PI)) <= tolerance)
 
 
@@ -117,7 +119,7 @@ def fits(word: cython.int, t: cython.double, p: cython.double, q: cython.double,
 @cython.nogil
 @cython.exceptval(check=False)
 def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q: cython.double, x: cython.double,
-                         y: cython.double, theta0: cython.double, theta1: cython.double
+                         y: cython.double, theta0: cython.double, theta1: cython.double, rounding: cython.double
                          ) -> tuple[cython.double, cython.double, cython.double]:
     """The curve with first and last turns that are 2 pi but for rounding taken as none, if the end still fits.
 
@@ -127,12 +129,12 @@ def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q
     less_t: cython.double = 0 if t > TWO_PI - NEARLY_NONE else t
     less_q: cython.double = mod_two_pi(q + handed * (t - less_t))
     less_q = 0 if less_q > TWO_PI - NEARLY_NONE else less_q
-    if fits(word, less_t, p, less_q, x, y, theta0, theta1):
+    if fits(word, less_t, p, less_q, x, y, theta0, theta1, rounding):
         return less_t, p, less_q
     less_q = 0 if q > TWO_PI - NEARLY_NONE else q
     less_t = mod_two_pi(t + handed * (q - less_q))
     less_t = 0 if less_t > TWO_PI - NEARLY_NONE else less_t
-    if fits(word, less_t, p, less_q, x, y, theta0, theta1):
+    if fits(word, less_t, p, less_q, x, y, theta0, theta1, rounding):
         return less_t, p, less_q
     return t, p, q
 
@@ -165,11 +167,11 @@ def straight_turns_at_least(first: cython.int, last: cython.int, cos_straight: c
 @cython.exceptval(check=False)
 def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
          theta1: cython.double, sin1: cython.double, cos1: cython.double, left: cython.double,
-         limit: cython.double) -> tuple[cython.double, cython.double, cython.double]:
+         rounding: cython.double, limit: cython.double) -> tuple[cython.double, cython.double, cython.double]:
     """(t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1), or p = NO_CURVE: none, or none shorter than `limit`.
 
-    `left` is theta1 - theta0 in [0, 2 pi). It, (u, v), and the direction of the straight arc tell most words to be too long
-    before an arctangent is taken.
+    x and y are rounded by no more than `rounding`. `left` is theta1 - theta0 in [0, 2 pi). It, (u, v), and the direction of the
+    straight arc tell most words to be too long before an arctangent is taken.
     """
     s: cython.int = turn_of(word, 0)
     last: cython.int = turn_of(word, 2)
@@ -193,8 +195,8 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         t = mod_two_pi(s * (atan2(v, u) - theta0) + p / 2)
         q = mod_two_pi(turned - t + p)
     elif s == last:
-        least = FIT * (1 + fabs(x) + fabs(y))
-        if squared <= least * least and turned < limit and fits(word, turned, 0, 0, x, y, theta0, theta1):
+        least = FIT * (1 + fabs(x) + fabs(y)) + rounding
+        if squared <= least * least and turned < limit and fits(word, turned, 0, 0, x, y, theta0, theta1, rounding):
             return turned, 0, 0  # both poses on one circle, where the direction of (u, v) is but rounding
         if turned >= limit or squared >= (limit - turned) * (limit - turned):
             return 0, NO_CURVE, 0
@@ -214,8 +216,16 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         t = mod_two_pi(s * (atan2(v, u) - theta0) + atan2(2.0, p))
         q = mod_two_pi(t - turned)
     if t > TWO_PI - NEARLY_NONE or q > TWO_PI - NEARLY_NONE:
-        return without_full_circles(word, t, p, q, x, y, theta0, theta1)
+        return without_full_circles(word, t, p, q, x, y, theta0, theta1, rounding)
     return t, p, q
+
+
+@cython.ccall
+@cython.nogil
+@cython.exceptval(check=False)
+def rounding_at(x: cython.double, y: cython.double) -> cython.double:
+    """By how much the rounding of poses around (x, y) may move what lies between them [m]."""
+    return COORDINATE_ERROR * max(fabs(x), fabs(y))
 
 
 @cython.cfunc
@@ -223,10 +233,12 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
 @cython.exceptval(check=False)
 def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
                     theta1: cython.double, sin1: cython.double, cos1: cython.double, radius: cython.double,
-                    limit: cython.double) -> tuple[cython.int, cython.double, cython.double, cython.double]:
+                    rounding: cython.double, limit: cython.double
+                    ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
     """(word, first, second, third) in metres: the shortest curve to a goal that lies (dx, dy) from the start.
 
-    `first` is NO_CURVE where that is not shorter than `limit`, which is found out in a fraction of the time.
+    dx and dy, in metres too, are rounded by no more than `rounding`. `first` is NO_CURVE where that curve is not shorter than
+    `limit`, which is found out in a fraction of the time.
     """
     x: cython.double = dx / radius
     y: cython.double = dy / radius
@@ -245,7 +257,7 @@ def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double,
     for word in range(6):
         if word == 4 and best <= PI:
             break
-        t, p, q = arcs(word, x, y, theta0, sin0, cos0, theta1, sin1, cos1, left, best)
+        t, p, q = arcs(word, x, y, theta0, sin0, cos0, theta1, sin1, cos1, left, rounding / radius, best)
         if t + p + q < best:
             best, best_word, best_t, best_p, best_q = t + p + q, word, t, p, q
     if best_t == NO_CURVE:
@@ -261,7 +273,7 @@ def shortest(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cy
              ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
     """(word, first, second, third): the shortest curve; lengths in metres."""
     return shortest_within(x1 - x0, y1 - y0, theta0, sin(theta0), cos(theta0), theta1, sin(theta1), cos(theta1),
-                           radius, NO_CURVE)
+                           radius, max(rounding_at(x0, y0), rounding_at(x1, y1)), NO_CURVE)
 
 
 def shortest_curve(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cython.double, y1: cython.double,
@@ -280,7 +292,8 @@ def all_curves(x0: cython.double, y0: cython.double, theta0: cython.double, x1: 
     found = []
     for word in range(6):
         t, p, q = arcs(word, (x1 - x0) / radius, (y1 - y0) / radius, theta0, sin(theta0), cos(theta0),
-                       theta1, sin(theta1), cos(theta1), mod_two_pi(theta1 - theta0), NO_CURVE)
+                       theta1, sin(theta1), cos(theta1), mod_two_pi(theta1 - theta0),
+                       max(rounding_at(x0, y0), rounding_at(x1, y1)) / radius, NO_CURVE)
         if p < NO_CURVE:
             found.append((word, t * radius, p * radius, q * radius))
     return found

@@ -11,7 +11,7 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, shortest_within
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within
     from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
     from cython.cimports.libc.math import cos, remainder, sin
@@ -19,7 +19,7 @@ else:
     from math import cos, remainder, sin
 
     from .body import Body
-    from .dubins import NO_CURVE, TWO_PI, drive, shortest_within
+    from .dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within
     from .field import CostField
     from .heap import Heap
 
@@ -45,6 +45,7 @@ class HybridAStar:
     goals: cython.double[:, ::1]
     x0: cython.double
     y0: cython.double
+    rounding: cython.double
     arc: cython.double
     cell: cython.double
     sectors: cython.int
@@ -81,6 +82,7 @@ class HybridAStar:
         self.body, self.radius = body, radius
         self.to_goal, self.goals = to_goal, goals
         self.x0, self.y0 = corner
+        self.rounding = max(rounding_at(self.x0, self.y0), rounding_at(self.x0 + extent[0], self.y0 + extent[1]))
         self.arc, self.cell, self.sectors, self.weight, self.limit = arc, 0.7 * arc, sectors, weight, limit
         self.columns, self.rows = int(extent[0] / self.cell) + 1, int(extent[1] / self.cell) + 1
         self.best_cost = np.zeros(min(int(self.columns) * int(self.rows) * sectors, MOST_CELLS), np.float32)
@@ -207,7 +209,8 @@ class HybridAStar:
                       ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
         """The shortest curve to one of the goals, or none shorter than `limit`."""
         return shortest_within(self.goals[goal, 0] - x, self.goals[goal, 1] - y, theta, sin(theta), cos(theta),
-                               self.goals[goal, 2], sin(self.goals[goal, 2]), cos(self.goals[goal, 2]), self.radius, limit)
+                               self.goals[goal, 2], sin(self.goals[goal, 2]), cos(self.goals[goal, 2]), self.radius,
+                               self.rounding, limit)
 
     @cython.cfunc
     @cython.nogil

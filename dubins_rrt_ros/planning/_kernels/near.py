@@ -144,7 +144,7 @@ class NearSet:
         third: cython.double
         word, first, second, third = shortest_within(
             -dx, -dy, self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1],
-            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, limit)
+            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.tree.rounding, limit)
         if first < NO_CURVE:
             self.insert(node, word, first, second, third)
 
@@ -241,7 +241,8 @@ class GainSet(NearSet):
             return
         word, first, second, third = shortest_within(
             dx, dy, self.theta, self.sin_theta, self.cos_theta,
-            self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1], self.tree.radius, limit)
+            self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1], self.tree.radius,
+            self.tree.rounding, limit)
         if first < NO_CURVE:
             self.nodes[self.count] = node
             self.words[self.count] = word

@@ -11,13 +11,20 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, shortest_within, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
+        NO_CURVE,
+        TWO_PI,
+        drive,
+        rounding_at,
+        shortest_within,
+        turn_of,
+    )
     from cython.cimports.libc.math import cos, exp, log, remainder, sin
 else:
     from math import cos, exp, log, remainder, sin
 
     from .body import Body
-    from .dubins import NO_CURVE, TWO_PI, drive, shortest_within, turn_of
+    from .dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within, turn_of
 
 #: A smaller gain is rounding [m].
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
@@ -193,7 +200,7 @@ class Polisher:
         second: cython.double
         third: cython.double
         word, first, second, third = shortest_within(x - self.x, y - self.y, self.theta, sin(self.theta), cos(self.theta),
-                                                     theta, sin(theta), cos(theta), self.radius, limit)
+                                                     theta, sin(theta), cos(theta), self.radius, rounding_at(x, y), limit)
         if first == NO_CURVE:
             return False
         self.append(x, y, theta, word)

@@ -2,6 +2,7 @@ cdef class SearchTree:
     cdef readonly int size
     cdef readonly int indexed
     cdef readonly double radius
+    cdef readonly double rounding
     cdef readonly double[:, ::1] poses
     cdef double[:, ::1] headings
     cdef readonly int[::1] parents

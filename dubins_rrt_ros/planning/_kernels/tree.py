@@ -5,10 +5,12 @@ import cython
 import numpy as np
 
 if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import rounding_at
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
+    from .dubins import rounding_at
 
 #: About how many buckets there are at first. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
 BUCKETS = 1024
@@ -24,6 +26,7 @@ class SearchTree:
         size: how many nodes there are; node 0 is the root. The arrays are longer.
         indexed: how many of them are found as neighbours.
         radius: the turning radius of all edges [m].
+        rounding: by how much the rounding of coordinates may move what lies between two poses [m].
         poses: (n, 3): x [m], y [m], theta [rad].
         headings: (n, 2): sine and cosine of theta.
         parents: (n,), the root's is -1.
@@ -41,6 +44,7 @@ class SearchTree:
         self.radius = radius
         self.x0, self.y0 = corner
         self.x_extent, self.y_extent = extent
+        self.rounding = max(rounding_at(self.x0, self.y0), rounding_at(self.x0 + self.x_extent, self.y0 + self.y_extent))
         self.make_buckets(BUCKETS)
         self.size = self.indexed = 0
         self.poses = np.empty((0, 3))
