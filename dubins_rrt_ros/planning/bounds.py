@@ -69,10 +69,13 @@ def lower_bound(problem: Problem, field: DistanceField | None = None) -> float:
 def nearest_in_map(map: Map, point: Point) -> Point:
     """The point of the map's rectangle that is nearest to `point`: itself where it is inside."""
     corner, sides = _rectangle(map)
-    share = (np.clip(point, -FAR, FAR) - corner) @ sides.T / (sides**2).sum(axis=1)
-    if ((share >= 0) & (share <= 1)).all():
+    (x0, y0), ((ax, ay), (bx, by)) = corner.tolist(), sides.tolist()  # as floats: each request asks
+    dx, dy = (min(max(c, -FAR), FAR) - c0 for c, c0 in zip(point, (x0, y0), strict=True))
+    a, b = (dx * ax + dy * ay) / (ax * ax + ay * ay), (dx * bx + dy * by) / (bx * bx + by * by)
+    if 0 <= a <= 1 and 0 <= b <= 1:
         return point
-    return tuple((corner + share.clip(0, 1) @ sides).tolist())
+    a, b = min(max(a, 0.0), 1.0), min(max(b, 0.0), 1.0)
+    return x0 + a * ax + b * bx, y0 + a * ay + b * by
 
 
 def has_no_room(field: ClearanceField, need: float, point: Point, tolerance: float) -> bool:
@@ -219,8 +222,12 @@ def _rectangle(map: Map) -> tuple[np.ndarray, np.ndarray]:
 
 def _have_different_labels(problem: Problem, field: ClearanceField, labels: np.ndarray) -> bool:
     """Whether the label at the start is none of those within the goal's tolerance."""
-    start = labels[field.cells(np.array(problem.start[:2]))]
-    return start not in labels[_cells_within(problem.goal[:2], problem.goal_tolerance_xy, field)]
+    cells = field.cells(np.array([problem.start[:2], problem.goal[:2]]))
+    (start_row, row), (start_column, column) = (indices.tolist() for indices in cells)
+    # A window that holds all cells with a point within the tolerance.
+    reach = math.ceil(problem.goal_tolerance_xy / field.kernel.resolution) + (problem.goal_tolerance_xy > 0)
+    window = labels[max(0, row - reach):row + reach + 1, max(0, column - reach):column + reach + 1]
+    return labels[start_row, start_column] not in window
 
 
 def _are_in_different_parts(problem: Problem) -> bool:
@@ -228,10 +235,3 @@ def _are_in_different_parts(problem: Problem) -> bool:
     parts = shapely.get_parts(problem.map.free)
     of_start = parts[shapely.intersects(parts, shapely.Point(problem.start[:2]))]
     return bool((shapely.distance(of_start, shapely.Point(problem.goal[:2])) > problem.goal_tolerance_xy).all())
-
-
-def _cells_within(centre: Point, distance: float, field: ClearanceField) -> tuple[slice, slice]:
-    """A window of the raster that holds all cells with a point within `distance` of `centre`."""
-    row, column = field.cells(np.array(centre))
-    reach = math.ceil(distance / field.kernel.resolution) + (distance > 0)
-    return slice(max(0, row - reach), row + reach + 1), slice(max(0, column - reach), column + reach + 1)

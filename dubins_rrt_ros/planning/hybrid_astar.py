@@ -1,6 +1,7 @@
 """Runs of hybrid A*: a first path at once, and then paths that lead another way."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -40,12 +41,15 @@ class HybridAStarRuns:
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: DistanceField):
         self._problem, self._field, self._to_goal = problem, field, to_goal
         self._body = field.body(problem.vehicle)
-        self._rng = np.random.default_rng((settings.seed, 1))  # apart from that of the samples
-        self._shortcut = settings.shortcut
+        self._settings = settings
         self._goals = _goals(problem)
         self._current: HybridAStar | None = None
         self._begun = self._in_vain = 0
         self.exhausted = False
+
+    @cached_property
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng((self._settings.seed, 1))  # apart from that of the samples
 
     @property
     def between_runs(self) -> bool:
@@ -70,7 +74,7 @@ class HybridAStarRuns:
         path = self._current.path()
         self._current = None
         chain = Chain(*path) if path else None
-        if chain and best is not None and self._shortcut:
+        if chain and best is not None and self._settings.shortcut:
             for fresh in (True, False):
                 chain = polished(chain, self._problem.vehicle, self._field, self._rng, fresh)
         self._count(chain is not None and (best is None or chain.length < best), best is None)

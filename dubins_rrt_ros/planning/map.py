@@ -67,8 +67,7 @@ class GridMap:
             raise MapMetadataError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them "
                                    f"from ({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, "
                                    f"cells of {FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
-        data.setflags(write=False)
-        object.__setattr__(self, "data", data)
+        object.__setattr__(self, "data", _read_only(data))
         object.__setattr__(self, "resolution", float(self.resolution))
         object.__setattr__(self, "origin", tuple(map(float, self.origin)))
 
@@ -105,9 +104,13 @@ class GridMap:
                        (*corner, self.origin[2]), self.name)
 
     def corners(self) -> np.ndarray:
-        """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]."""
+        """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]; read-only."""
+        return self._corners
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
         w, h = self.size
-        return self.to_map_frame(np.array([[0, 0], [w, 0], [w, h], [0, h]]))
+        return _read_only(self.to_map_frame(np.array([[0, 0], [w, 0], [w, h], [0, h]])))
 
     @cached_property
     def id(self) -> str:
@@ -139,9 +142,13 @@ class PolygonMap:
         prepare_for_threads(self.free)
 
     def corners(self) -> np.ndarray:
-        """(4, 2) corners of the bounding rectangle, counter-clockwise [m]."""
+        """(4, 2) corners of the bounding rectangle, counter-clockwise [m]; read-only."""
+        return self._corners
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
         x0, y0, x1, y1 = shapely.bounds(self.free)
-        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        return _read_only(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]))
 
     @cached_property
     def id(self) -> str:
@@ -150,6 +157,11 @@ class PolygonMap:
 
 
 Map = GridMap | PolygonMap
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.setflags(write=False)
+    return array
 
 
 def prepare_for_threads(polygons: shapely.Geometry) -> None:

@@ -27,6 +27,7 @@ samples alone, so that the path does not depend on the time nor on the number of
 
 import math
 import time
+from functools import cached_property
 
 import numpy as np
 
@@ -79,14 +80,12 @@ class Search:
         self._grower = Grower(self._tree, field.body(vehicle), settings.step_size, NEAR_FACTOR, MOST_NEAR,
                               problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
-        self._sampler = Sampler(problem, settings, field, to_goal)
         self._problem, self._settings, self._field, self._to_goal = problem, settings, field, to_goal
         self._beside = Beside()
         self._runs = self._portion = self._bound_to_goal = self._bound_from_start = None
         if settings.informed:
             self._runs = HybridAStarRuns(problem, settings, field, to_goal)
         self._from_start: DistanceField | None = None
-        self._rng = np.random.default_rng((settings.seed, 2))  # apart from that of the samples
         self._block = np.empty((0, 3))
         self._used = 0
         self._batch = 8
@@ -97,6 +96,15 @@ class Search:
         self._seen = self._forgot_above = math.inf
         self.samples = 0
         self.best = -1
+
+    # Neither is needed for the first path of hybrid A*, which need not wait for them.
+    @cached_property
+    def _sampler(self) -> Sampler:
+        return Sampler(self._problem, self._settings, self._field, self._to_goal)
+
+    @cached_property
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng((self._settings.seed, 2))  # apart from that of the samples
 
     @property
     def size(self) -> int:
