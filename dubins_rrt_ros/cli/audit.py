@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,8 +15,8 @@ from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_req
 from dubins_rrt_ros.planning.wording import quoted
 
 from .bench_problems import read_json
-from .flags import UsageError, add_option_flags, given_options
-from .output import STDOUT, check_folder, write_document
+from .flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .output import check_folder, finite, words_for, write_document
 from .request import MAX_MAP_CELLS, read_map
 
 #: How far poses may be off by default [m, rad]: ample for four digits behind the point.
@@ -38,19 +37,24 @@ class Verdict(NamedTuple):
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "audit", help="judge a path, whoever planned it", argument_default=argparse.SUPPRESS,
+    parser = add_command(
+        subparsers, "audit", usage="PATH.json MAP [options]", help="judge a path, whoever planned it",
+        argument_default=argparse.SUPPRESS,
         description="Judges a path by code that shares nothing with the planner: whether a car can drive it, no tighter than "
                     "its turning radius, and whether all that the vehicle sweeps, between poses too, is clear of the obstacles.",
-        epilog="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
-               "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
-               "of constant curvature from each to the next, with the vehicle that the flags describe. Example: `dubins_rrt "
-               "audit theirs.json maze --turning-radius 1 --footprint '[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]'`. "
-               "Exit status: 0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage.")
+        notes="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
+              "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
+              "of constant curvature from each to the next, with the vehicle that the flags describe.",
+        examples=["dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --json plan.json",
+                  "dubins_rrt audit plan.json maze",
+                  "echo '[[1.5, 2, 1.5708], [1.5, 3, 1.5708], [1.5, 4, 1.5708]]' > theirs.json",
+                  "dubins_rrt audit theirs.json maze --turning-radius 1 --footprint "
+                  "'[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]'"],
+        exit_status="0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage")
     parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
     parser.add_argument("map", metavar="MAP",
                         help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze")
-    parser.add_argument("--json", metavar="FILE", help="write the verdict; - is standard output")
+    add_json_flag(parser, "the verdict")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
     pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW")}
@@ -73,16 +77,14 @@ def _add_tolerances(group: argparse._ArgumentGroup) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Judge, report, and return the exit status."""
-    file = getattr(arguments, "json", None)
-    check_folder(file)
+    check_folder(arguments.json)
     for name in ("tolerance_xy", "tolerance_yaw"):
         if not 0 <= getattr(arguments, name) < math.inf:
             raise UsageError(f"--{name.replace('_', '-')} is {getattr(arguments, name):g}; give 0 or more")
     verdict = _judge(arguments)
-    if file:
-        write_document(file, _document(verdict, arguments.map))
-    out = sys.stderr if file == STDOUT else sys.stdout
-    print(_sentence(arguments.path, verdict), *verdict.audit.findings, sep="\n", file=out)
+    if arguments.json:
+        write_document(arguments.json, finite(_document(verdict, arguments.map)))
+    print(_sentence(arguments.path, verdict), *verdict.audit.findings, sep="\n", file=words_for(arguments.json))
     return 0 if verdict.audit.ok else 1
 
 
@@ -146,8 +148,7 @@ def _sentence(file: str, verdict: Verdict) -> str:
 def _document(verdict: Verdict, map_name: str) -> dict[str, Any]:
     """The verdict as what JSON can hold."""
     problem, found = verdict.problem, verdict.audit
-    figures = {"length": verdict.length, "min_clearance": found.min_clearance, "max_curvature": found.max_curvature}
-    return {"ok": found.ok, "findings": list(found.findings),
-            **{name: figure if math.isfinite(figure) else None for name, figure in figures.items()},
+    return {"ok": found.ok, "findings": list(found.findings), "length": verdict.length,
+            "min_clearance": found.min_clearance, "max_curvature": found.max_curvature,
             "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
             "vehicle": values(problem.vehicle), "request": values(problem), "version": __version__}

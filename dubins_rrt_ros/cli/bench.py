@@ -3,28 +3,26 @@
 import argparse
 import contextlib
 import json
-import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.options import option
 
-from .bench_lines import best_known, grouped, read_best_known, read_runs, run_of
+from .bench_lines import Best, Runs, best_known, grouped, read_best_known, read_runs, run_of
 from .bench_problems import chosen, read_cases
-from .bench_report import summary, to_markdown
+from .bench_report import summary, to_document, to_markdown
 from .bench_runs import Task, results
-from .flags import UsageError, add_option_flags, given_options
-from .output import STDOUT, check_drawing, check_folder
+from .flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
+from .progress import with_bar
 
 DEFAULT_TIME = 5.0
 _HIGHEST = {item.name: item.high for item in options(Settings)}
 #: The arguments that a report takes, and those of every call; all others are for measuring.
-_OF_REPORT, _OF_ALL = {"report", "best_known", "plot"}, {"command", "run", "out"}
+_OF_REPORT, _OF_ALL = {"report", "best_known", "plot"}, {"command", "run", "out", "json"}
 
 
 @dataclass(frozen=True)
@@ -39,15 +37,23 @@ class _Flags(Settings):
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "bench", help="measure the planner on a file of problems, and compare", argument_default=argparse.SUPPRESS,
+    parser = add_command(
+        subparsers, "bench", usage="(PROBLEMS.json --out FILE | --report FILE [FILE ...]) [options]",
+        help="measure the planner on a file of problems, and compare", argument_default=argparse.SUPPRESS,
         description="Plans every problem of a file with several seeds and writes a line of JSON for each run, as soon as it is "
                     "done; or, with --report, compares the runs in such files.",
-        epilog="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
-               "the path; with both, whichever is used up first. Exit status: 0 all runs solved or a report, 1 some run "
-               "unsolved, 2 wrong usage, 130 interrupted; the lines written by then stay.")
+        notes="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
+              "the path; with both, whichever is used up first. Where it is interrupted, the lines written by then stay.",
+        examples=["dubins_rrt render maze.geojson --out .",
+                  'echo \'[{"name": "maze", "map": "maze.yaml", "start": [1.5, 2, 1.57], "goal": [13.5, 10.5, 1.57],\' \\',
+                  "    '\"turning_radius\": 1, \"robot_radius\": 0.2}]' > problems.json",
+                  "dubins_rrt bench problems.json --samples 1000 --seeds 3 --out ours.jsonl",
+                  "dubins_rrt bench problems.json --samples 1000 --seeds 3 --no-informed --label plain --out plain.jsonl",
+                  "dubins_rrt bench --report ours.jsonl plain.jsonl --plot report.png"],
+        exit_status="0 all runs solved or a report, 1 some run unsolved, 2 wrong usage, 130 interrupted")
     parser.add_argument("--out", metavar="FILE", help="where to write: the lines of JSON; with --report the report as Markdown, "
                                                       "which goes to standard output otherwise")
+    add_json_flag(parser, "what the runs amount to")
     _add_measuring(parser.add_argument_group("measuring"))
     add_option_flags(parser, "settings", _Flags)
     _add_report(parser.add_argument_group("report"))
@@ -87,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _check_outputs(given: dict[str, Any]) -> None:
     """Refuse files that cannot be written, or that would be written over before they are read."""
     out, plot = given.get("out"), given.get("plot")
-    check_folder(out, plot)
+    check_folder(out, plot, given["json"])
     check_drawing(plot)
     sources = given.get("report", [given["file"]] if "file" in given else [])
     if out and Path(out).resolve() in [Path(source).resolve() for source in sources]:
@@ -102,11 +108,13 @@ def _measure(arguments: argparse.Namespace) -> int:
     tasks, jobs = _tasks(arguments), _count(arguments, "jobs")
     lines = []
     with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(results(tasks, jobs)) as running:
-        for line in tqdm(running, total=len(tasks), unit=" runs", file=sys.stderr, disable=None, leave=False):
+        for line in with_bar(running, len(tasks), " runs"):
             out.write(json.dumps(line, allow_nan=False) + "\n")
             out.flush()
             lines.append(line)
-    print(summary(grouped(map(run_of, lines))))
+    runs = grouped(map(run_of, lines))
+    _write_json(arguments.json, runs, best_known(runs, {}))
+    print(summary(runs), file=words_for(arguments.json))
     return 0 if all(line["solved"] for line in lines) else 1
 
 
@@ -139,12 +147,18 @@ def _count(arguments: argparse.Namespace, name: str) -> int:
 def _report(given: dict[str, Any]) -> int:
     runs = read_runs(given["report"])
     best = best_known(runs, read_best_known(given["best_known"]) if "best_known" in given else {})
+    _write_json(given["json"], runs, best)
     text = to_markdown(runs, best)
     if given.get("out", STDOUT) == STDOUT:
-        print(text, end="")
+        print(text, end="", file=words_for(given["json"]))
     else:
         Path(given["out"]).write_text(text, encoding="utf-8")
     if "plot" in given:
         from .bench_plots import draw_runs  # here, for matplotlib takes long to import
         draw_runs(given["plot"], runs, best)
     return 0
+
+
+def _write_json(file: str | None, runs: Runs, best: Mapping[str, Best]) -> None:
+    if file:
+        write_document(file, finite(to_document(runs, best)))

@@ -6,6 +6,7 @@ each is a value that was measured. Runs without a path that passed its check cou
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from .bench_lines import Best, Run, Runs
 
@@ -23,6 +24,13 @@ def quantile(values: Iterable[float], share: float) -> float:
     """The least value that at least this share of the values does not exceed."""
     ordered = sorted(values)
     return ordered[max(math.ceil(share * len(ordered)) - 1, 0)]
+
+
+def quartiles(values: Iterable[float]) -> dict[str, float]:
+    """The three values that split them into quarters, by name."""
+    ordered = sorted(values)
+    names = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75}
+    return {name: quantile(ordered, share) for name, share in names.items()}
 
 
 def median(values: Iterable[float]) -> float:
@@ -45,7 +53,7 @@ def ratio(cost: float, best: Best) -> float:
 
 def summary(runs: Runs) -> str:
     """A line for each problem: how many runs are solved, and the medians."""
-    return "\n".join(f"{problem}: {_solved(group)} solved, "
+    return "\n".join(f"{problem}: {sum(run.solved for run in group)}/{len(group)} solved, "
                      f"first path {milliseconds(median(run.first[0] for run in group))} ms, "
                      f"{metres(median(run.cost for run in group))} m"
                      for problem, planners in runs.items() for group in planners.values())
@@ -61,6 +69,43 @@ def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def to_document(runs: Runs, best: Mapping[str, Best]) -> dict[str, Any]:
+    """What the report computes as what JSON can hold, but for what is infinite; times in seconds, lengths in metres."""
+    marks = marks_of(runs)
+    names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
+    results = [{"problem": problem, "planner": planner, "best_known": best[problem].cost, **_figures(group, best[problem], marks)}
+               for problem, planners in runs.items() for planner, group in planners.items()]
+    return {"planners": [{"planner": name} | _overall(name, runs, best, marks) for name in names], "results": results}
+
+
+def _figures(group: list[Run], best: Best, marks: list[float]) -> dict[str, Any]:
+    """Of a planner's runs of a problem."""
+    return {"runs": len(group), "solved": sum(run.solved for run in group),
+            "time_to_first": quartiles(run.first[0] for run in group), "first_cost": quartiles(run.first[1] for run in group),
+            "final_cost": quartiles(run.cost for run in group),
+            "cost_at": {f"{mark:g}": quartiles(run.cost_at(mark) for run in group) for mark in marks},
+            "time_to_within": {f"{share:g}": median(run.time_to((1 + share) * best.cost) for run in group) for share in SHARES}}
+
+
+def _overall(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> dict[str, Any]:
+    """Of a planner's runs of all problems: means of medians, each with how many of the problems have one."""
+    groups = {problem: planners[planner] for problem, planners in runs.items() if planner in planners}
+    everything = [run for group in groups.values() for run in group]
+    ratios = {mark: [ratio(median(run.cost_at(mark) for run in group), best[problem]) for problem, group in groups.items()]
+              for mark in marks}
+    return {"runs": len(everything), "solved": sum(run.solved for run in everything), "problems": len(runs),
+            "problems_solved": sum(math.isfinite(median(run.cost for run in group)) for group in groups.values()),
+            "time_to_first": _mean(median(run.first[0] for run in group) for group in groups.values()),
+            "cost_over_best_known": {f"{mark:g}": _mean(values) for mark, values in ratios.items()}}
+
+
+def _mean(values: Iterable[float]) -> dict[str, float]:
+    """The geometric mean of those that are finite, and how many they are."""
+    finite = [value for value in values if math.isfinite(value)]
+    mean = math.prod(value ** (1 / len(finite)) for value in finite) if finite else math.inf
+    return {"geometric_mean": mean, "problems": len(finite)}
+
+
 def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> str:
     names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
     head = ["planner", "solved runs", "problems solved in the median", "first path [ms]",
@@ -70,46 +115,45 @@ def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> str:
 
 
 def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> list[str]:
-    groups = {problem: planners[planner] for problem, planners in runs.items() if planner in planners}
-    solved = sum(math.isfinite(median(run.cost for run in group)) for group in groups.values())
-    first = [median(run.first[0] for run in group) for group in groups.values()]
-    at_marks = ([ratio(median(run.cost_at(mark) for run in group), best[problem]) for problem, group in groups.items()]
-                for mark in marks)
-    return [planner, _solved([run for group in groups.values() for run in group]), f"{solved}/{len(runs)}",
-            _mean(first, len(runs), milliseconds), *(_mean(ratios, len(runs), "{:.4f}".format) for ratios in at_marks)]
+    overall = _overall(planner, runs, best, marks)
+    return [planner, _share(overall), f"{overall['problems_solved']}/{overall['problems']}",
+            _shown(overall["time_to_first"], len(runs), milliseconds),
+            *(_shown(mean, len(runs), "{:.4f}".format) for mean in overall["cost_over_best_known"].values())]
 
 
-def _mean(values: list[float], problems: int, show: Callable[[float], str]) -> str:
-    """The geometric mean of those that are finite, and how many they are unless it is one for each problem."""
-    finite = [value for value in values if math.isfinite(value)]
-    if not finite:
+def _shown(mean: Mapping[str, float], problems: int, show: Callable[[float], str]) -> str:
+    """A mean, and of how many values it is, unless it is of one for each problem."""
+    if not mean["problems"]:
         return "-"
-    mean = show(math.prod(value ** (1 / len(finite)) for value in finite))
-    return mean if len(finite) == problems else f"{mean} ({len(finite)}/{problems})"
+    text = show(mean["geometric_mean"])
+    return text if mean["problems"] == problems else f"{text} ({mean['problems']}/{problems})"
 
 
 def _problem_table(planners: Mapping[str, list[Run]], best: Best, marks: list[float]) -> str:
     head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks),
             *(f"{100 * share:g} % above best [ms]" for share in SHARES)]
-    return table(head, [_problem_row(planner, group, best, marks) for planner, group in planners.items()])
+    return table(head, [_problem_row(planner, _figures(group, best, marks)) for planner, group in planners.items()])
 
 
-def _problem_row(planner: str, group: list[Run], best: Best, marks: list[float]) -> list[str]:
-    *early, last = ([run.cost_at(mark) for run in group] for mark in marks)
-    reach = ((1 + share) * best.cost for share in SHARES)
-    return [planner, _solved(group), spread([run.first[0] for run in group], milliseconds),
-            metres(median(run.first[1] for run in group)), *(metres(median(costs)) for costs in early), spread(last, metres),
-            *(milliseconds(median(run.time_to(cost) for run in group)) for cost in reach)]
+def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
+    *early, last = figures["cost_at"].values()
+    return [planner, _share(figures), _spread(figures["time_to_first"], milliseconds), metres(figures["first_cost"]["median"]),
+            *(metres(costs["median"]) for costs in early), _spread(last, metres),
+            *map(milliseconds, figures["time_to_within"].values())]
 
 
 def spread(values: list[float], show: Callable[[float], str]) -> str:
     """Median and quartiles."""
-    low, middle, high = (show(quantile(values, share)) for share in (0.25, 0.5, 0.75))
+    return _spread(quartiles(values), show)
+
+
+def _spread(values: Mapping[str, float], show: Callable[[float], str]) -> str:
+    low, middle, high = map(show, values.values())
     return middle if low == high == "-" else f"{middle} [{low}, {high}]"
 
 
-def _solved(group: list[Run]) -> str:
-    return f"{sum(run.solved for run in group)}/{len(group)}"
+def _share(figures: Mapping[str, Any]) -> str:
+    return f"{figures['solved']}/{figures['runs']}"
 
 
 def metres(value: float, digits: int = 2) -> str:

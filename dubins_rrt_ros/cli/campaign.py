@@ -3,19 +3,19 @@
 import argparse
 import contextlib
 import json
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
+from dubins_rrt_ros import __version__
 
 from .campaign_judge import Task, judged
 from .campaign_runs import results
-from .flags import UsageError
-from .output import check_folder
+from .flags import UsageError, add_command, add_json_flag
+from .output import check_folder, words_for, write_document
+from .progress import with_bar
 
 #: A problem that takes longer hangs [s]: it is planned twice at most, for a minute each.
 LIMIT = 300.0
@@ -28,14 +28,15 @@ _KNOWN = {True: ", passes", False: ", does not pass", None: ""}
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "campaign", help="try to prove the planner wrong with random problems",
+    parser = add_command(
+        subparsers, "campaign", usage="[options]", help="try to prove the planner wrong with random problems",
         description="Plans random problems - grids of many resolutions, polygons, mazes, gaps that just pass and that just fail, "
                     "starts and goals that touch obstacles, discs and polygons as vehicles, all planners and samplers - and "
                     "judges each answer by the audit: the path, all edges of the tree, and what the status claims.",
-        epilog="A number and a seed always give the same problem. Whatever is wrong is told with the command that repeats it. "
-               "Example: `dubins_rrt campaign --problems 10000 --seed 5 --jobs 2 --out campaign.jsonl`. Exit status: 0 all is "
-               "right, 1 something is not, 2 wrong usage, 130 interrupted; what was done by then is reported.")
+        notes="A number and a seed always give the same problem. Whatever is wrong is told with the command that repeats it. "
+              "Where it is interrupted, what was done by then is reported.",
+        examples=["dubins_rrt campaign --problems 20", "dubins_rrt campaign --problems 10000 --seed 5 --jobs 2 --json -"],
+        exit_status="0 all is right, 1 something is not, 2 wrong usage, 130 interrupted")
     parser.add_argument("--problems", metavar="N", type=int, default=1000, help="how many; default 1000")
     parser.add_argument("--seed", metavar="S", type=int, default=0, help="of the problems; default 0")
     parser.add_argument("--first", metavar="K", type=int, default=0, help="the number of the first problem; default 0")
@@ -43,6 +44,7 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                         help=f"work in J processes, where crashes and problems that take more than {LIMIT:g} s are told too; "
                              "default 1, this process")
     parser.add_argument("--out", metavar="FILE", help="write a line of JSON for each problem")
+    add_json_flag(parser, "the counts, and all disagreements,")
     parser.set_defaults(run=run)
 
 
@@ -51,15 +53,15 @@ def run(arguments: argparse.Namespace) -> int:
     for name, least in (("problems", 1), ("seed", 0), ("first", 0), ("jobs", 1)):
         if getattr(arguments, name) < least:
             raise UsageError(f"--{name} is {getattr(arguments, name)}; give {least} or more")
-    check_folder(arguments.out)
+    check_folder(arguments.out, arguments.json)
     tasks = [Task(arguments.seed, arguments.first + i) for i in range(arguments.problems)]
     lines, begin = [], time.perf_counter()
     try:
         lines.extend(_lines(tasks, arguments.jobs, arguments.out))
     except KeyboardInterrupt:
-        print(_report(lines, arguments.seed, time.perf_counter() - begin))
+        _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
         raise
-    print(_report(lines, arguments.seed, time.perf_counter() - begin))
+    _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
     return 1 if any(line["findings"] for line in lines) else 0
 
 
@@ -68,7 +70,7 @@ def _lines(tasks: list[Task], jobs: int, file: str | None) -> Iterator[dict[str,
     running = map(judged, tasks) if jobs == 1 else results(judged, tasks, jobs, LIMIT, _lost)
     with contextlib.ExitStack() as stack:
         out = stack.enter_context(Path(file).open("w", encoding="utf-8")) if file else None
-        for line in tqdm(running, total=len(tasks), unit=" problems", file=sys.stderr, disable=None, leave=False):
+        for line in with_bar(running, len(tasks), " problems"):
             if out:
                 out.write(json.dumps(line) + "\n")
                 out.flush()
@@ -81,29 +83,48 @@ def _lost(task: Task, what: str) -> dict[str, Any]:
             "seconds": LIMIT, "findings": [what]}
 
 
-def _report(lines: list[dict[str, Any]], seed: int, seconds: float) -> str:
-    """The counts, and each disagreement with the command that repeats it."""
+def _tell(counts: dict[str, Any], json_file: str | None) -> None:
+    if json_file:
+        write_document(json_file, counts)
+    print(_report(counts), file=words_for(json_file))
+
+
+def _counts(lines: list[dict[str, Any]], seed: int, seconds: float) -> dict[str, Any]:
+    """What the campaign came to: how many problems of each kind ended how, and each disagreement with what repeats it."""
+    labels = [line["kind"] + _KNOWN[line.get("fits")] for line in lines]
+    kinds = {label: dict(Counter(line["status"] for line, its in zip(lines, labels, strict=True) if its == label))
+             for label in sorted(set(labels))}
     wrong = sorted((line for line in lines if line["findings"]), key=lambda line: line["number"])
-    edges, paths, curves = (sum(line[name] for line in lines) for name in ("edges", "paths", "curves"))
-    parts = [*_table(lines), f"{len(lines)} problem{'s' * (len(lines) != 1)} of seed {seed} in {seconds:.0f} s: {paths} paths, "
-                             f"{edges} edges of trees and {curves} other curves judged; "
-                             f"{len(wrong)} disagreement{'s' * (len(wrong) != 1)}"]
-    for line in wrong:
-        repeat = f"dubins_rrt campaign --seed {line['seed']} --first {line['number']} --problems 1"
-        parts += [f"problem {line['number']}, {line['kind']}; repeat it with `{repeat}`:",
-                  *(f"  {finding}" for finding in line["findings"])]
+    disagreements = [{name: line[name] for name in ("number", "kind", "findings")} | {"repeat": _repeat(line)} for line in wrong]
+    return {"problems": len(lines), "seed": seed, "seconds": seconds,
+            **{name: sum(line[name] for line in lines) for name in ("paths", "edges", "curves")},
+            "kinds": kinds, "disagreements": disagreements, "version": __version__}
+
+
+def _repeat(line: dict[str, Any]) -> str:
+    """The command that repeats a problem."""
+    return f"dubins_rrt campaign --seed {line['seed']} --first {line['number']} --problems 1"
+
+
+def _report(counts: dict[str, Any]) -> str:
+    """The counts in words."""
+    problems, wrong = counts["problems"], counts["disagreements"]
+    parts = [*_table(counts["kinds"]),
+             f"{problems} problem{'s' * (problems != 1)} of seed {counts['seed']} in {counts['seconds']:.0f} s: "
+             f"{counts['paths']} paths, {counts['edges']} edges of trees and {counts['curves']} other curves judged; "
+             f"{len(wrong)} disagreement{'s' * (len(wrong) != 1)}"]
+    for each in wrong:
+        parts += [f"problem {each['number']}, {each['kind']}; repeat it with `{each['repeat']}`:",
+                  *(f"  {finding}" for finding in each["findings"])]
     return "\n".join(parts)
 
 
-def _table(lines: list[dict[str, Any]]) -> Iterator[str]:
+def _table(kinds: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
     """How many problems of each kind ended how."""
     yield _row("", "problems", *_COLUMNS, "other")
-    labels = [line["kind"] + _KNOWN[line.get("fits")] for line in lines]
-    groups = {label: [line for line, its in zip(lines, labels, strict=True) if its == label] for label in sorted(set(labels))}
-    for kind, some in (groups | {"all": lines}).items():
-        ends = Counter(line["status"] for line in some)
-        counts = [sum(ends[name] for name in names) for names in _COLUMNS.values()]
-        yield _row(kind, len(some), *counts, len(some) - sum(counts))
+    for kind, ends in (kinds | {"all": sum(map(Counter, kinds.values()), Counter())}).items():
+        counts = [sum(ends.get(name, 0) for name in names) for names in _COLUMNS.values()]
+        yield _row(kind, sum(ends.values()), *counts, sum(ends.values()) - sum(counts))
 
 
 def _row(first: str, *others: Any) -> str:

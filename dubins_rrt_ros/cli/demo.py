@@ -9,12 +9,14 @@ import signal
 import sys
 import tempfile
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.share import maps_directory
 
-from .output import check_drawing, check_folder
+from .flags import add_command, add_json_flag
+from .output import check_drawing, check_folder, words_for, write_document
 from .planner_process import DemoError, PlannerProcess
 
 if TYPE_CHECKING:
@@ -27,26 +29,33 @@ PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2,
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser("demo", help="see the ROS node plan in the maze",
-                                   description="Starts the node on the installed maze, sends it a start and a goal "
-                                               "over real topics, receives the path, draws it and stops the node.")
+    parser = add_command(subparsers, "demo", usage="[options]", help="see the ROS node plan in the maze",
+                         description="Starts the node on the installed maze, sends it a start and a goal over real topics, "
+                                     "receives the path, draws it and stops the node.",
+                         examples=["dubins_rrt demo", "dubins_rrt demo --plot maze.svg --json demo.json"],
+                         exit_status="0 a path was received, 1 none: the reason is on standard error, 2 wrong usage, "
+                                     "130 interrupted")
     parser.add_argument("--plot", metavar="FILE", default="demo.png",
                         help="the picture (.png, .svg, .pdf); default demo.png")
+    add_json_flag(parser, "what was received")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Demonstrate, and return the exit status: 0 with a path."""
-    check_folder(arguments.plot)
+    check_folder(arguments.plot, arguments.json)
     check_drawing(arguments.plot)
     try:
         answer, exit_status = _demonstrate()
     except DemoError as error:
         print(f"dubins_rrt demo: error: {error}", file=sys.stderr)
         return 1
-    _report(answer)
+    out = words_for(arguments.json)
+    print(_report(answer), file=out)
     _draw(arguments.plot, answer)
-    print(f"  picture        {arguments.plot}\n  node stopped   exit status {exit_status}")
+    if arguments.json:
+        write_document(arguments.json, _document(answer))
+    print(f"  picture        {arguments.plot}\n  node stopped   exit status {exit_status}", file=out)
     return 0
 
 
@@ -80,14 +89,22 @@ def _planner() -> Iterator[PlannerProcess]:
             signal.signal(signal.SIGTERM, before)
 
 
-def _report(answer: "Answer") -> None:
+def _report(answer: "Answer") -> str:
     figures = answer.figures
     gap = 100 * figures["gap"]
-    print(f"  path           {figures['path_length']:.2f} m, {len(answer.path)} poses on the topic plan\n"
-          f"  lower bound    {figures['lower_bound']:.2f} m, so at most {gap:.1f} % above the shortest\n"
-          f"  first path     after {1000 * figures['time_to_first']:.1f} ms\n"
-          f"  planning time  {1000 * figures['planning_time']:.1f} ms for {figures['samples']:.0f} samples, "
-          f"{figures['tree_nodes']:.0f} tree nodes")
+    return (f"  path           {figures['path_length']:.2f} m, {len(answer.path)} poses on the topic plan\n"
+            f"  lower bound    {figures['lower_bound']:.2f} m, so at most {gap:.1f} % above the shortest\n"
+            f"  first path     after {1000 * figures['time_to_first']:.1f} ms\n"
+            f"  planning time  {1000 * figures['planning_time']:.1f} ms for {figures['samples']:.0f} samples, "
+            f"{figures['tree_nodes']:.0f} tree nodes")
+
+
+def _document(answer: "Answer") -> dict[str, Any]:
+    """What was received as what JSON can hold, by the names that a plan's file has."""
+    figures = dict(answer.figures)
+    return {"length": figures.pop("path_length"), **figures, "samples": int(figures["samples"]),
+            "tree_nodes": int(figures["tree_nodes"]), "poses": answer.path.tolist(), "start": START, "goal": GOAL,
+            "settings": PARAMETERS, "version": __version__}
 
 
 def _draw(file: str, answer: "Answer") -> None:

@@ -2,8 +2,10 @@
 
 import csv
 import json
+import math
+import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import Plan
 from dubins_rrt_ros.planning.plan_file import to_document
@@ -35,6 +37,20 @@ def check_drawing(file: str | None) -> None:
     """
     if file and Path(file).suffix.lower() not in DRAWINGS:
         raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(DRAWINGS)}")
+
+
+def words_for(json_file: str | None) -> TextIO:
+    """Where the words for people go: to standard error where standard output is to hold the JSON alone."""
+    return sys.stderr if json_file == STDOUT else sys.stdout
+
+
+def finite(document: Any) -> Any:
+    """A document with null in place of what JSON has no numbers for, such as the length of a path that is not there."""
+    if isinstance(document, dict):
+        return {name: finite(value) for name, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [finite(value) for value in document]
+    return None if isinstance(document, float) and not math.isfinite(document) else document
 
 
 def write_json(file: str, plan: Plan, map_name: str) -> None:

@@ -6,16 +6,14 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
-
-from tqdm import tqdm
 
 from dubins_rrt_ros.planning import kernels_compiled
 
-from .flags import UsageError
+from .flags import UsageError, add_command, add_json_flag
+from .output import check_folder, finite, words_for, write_document
 from .paper_runs import Measured, all_runs, outcomes
+from .progress import with_bar
 
 SEEDS = 30
 REPORT, LINES = "report.md", "runs.jsonl"
@@ -23,18 +21,20 @@ REPORT, LINES = "report.md", "runs.jsonl"
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "paper", help="measure again what the paper measured",
+    parser = add_command(
+        subparsers, "paper", usage="[options]", help="measure again what the paper measured",
         description="Runs what the paper ran - RRT and RRT* in block, maze and forest, and its table of the maze - over many "
                     "seeds, and answers its open question: what if steps have no limit, and headings point towards the goal? "
                     f"Writes {REPORT} with tables and figures (.png and .svg), and {LINES}, a line of JSON for each run.",
-        epilog="Samples end the runs, not the time, so that the same seeds give the same lengths. "
-               "Example, in some seconds: `dubins_rrt paper --seeds 2 --out quick`; then open quick/report.md. "
-               "Exit status: 0 done, 2 wrong usage, 130 interrupted.")
+        notes="Samples end the runs, not the time, so that the same seeds give the same lengths. The first example takes some "
+              "seconds; then open quick/report.md.",
+        examples=["dubins_rrt paper --seeds 2 --out quick", "dubins_rrt paper --json answer.json"],
+        exit_status="0 done, 2 wrong usage, 130 interrupted")
     parser.add_argument("--out", metavar="DIR", default="paper_results", help="where to write; default paper_results")
     parser.add_argument("--seeds", metavar="N", type=int, default=SEEDS, help=f"use the seeds 0 to N-1; default {SEEDS}")
     parser.add_argument("--jobs", metavar="J", type=int, default=os.cpu_count() or 1,
                         help="run in J processes; default as many as there are cores")
+    add_json_flag(parser, "the report's tables and its answer")
     parser.set_defaults(run=run)
 
 
@@ -46,10 +46,11 @@ def run(arguments: argparse.Namespace) -> int:
     if not kernels_compiled:
         print("dubins_rrt paper: the kernels are not compiled, so this takes hours; install a C compiler and the package again",
               file=sys.stderr)
+    check_folder(arguments.json)
     folder, begin = Path(arguments.out), time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     measured = _measured(folder / LINES, arguments.seeds, arguments.jobs)
-    _report(folder, measured, arguments.jobs, begin)
+    _report(folder, measured, arguments, begin)
     return 0
 
 
@@ -57,24 +58,22 @@ def _measured(file: Path, seeds: int, jobs: int) -> Measured:
     """What came of all runs, each written to the file as soon as it is there."""
     runs, done = all_runs(seeds), {}
     with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(outcomes(runs, jobs)) as running:
-        for run, outcome in _with_bar(running, len(runs), " runs"):
+        for run, outcome in with_bar(running, len(runs), " runs"):
             done[run] = outcome
             figures = {name: value if outcome.solved or name == "reach" else None for name, value in outcome._asdict().items()}
             out.write(json.dumps(run._asdict() | figures, allow_nan=False) + "\n")
     return Measured(done, seeds)
 
 
-def _report(folder: Path, measured: Measured, jobs: int, begin: float) -> None:
+def _report(folder: Path, measured: Measured, arguments: argparse.Namespace, begin: float) -> None:
     """Draw the figures and write the report of what was begun then."""
     from .paper_figures import drawn_figures, figure_count  # here, for matplotlib takes long to import
-    from .paper_report import headline, to_markdown
-    for _ in _with_bar(drawn_figures(folder, measured), figure_count(), " figures"):
+    from .paper_report import headline, to_document, to_markdown
+    for _ in with_bar(drawn_figures(folder, measured), figure_count(), " figures"):
         pass
     seconds = time.perf_counter() - begin
-    (folder / REPORT).write_text(to_markdown(measured, jobs, seconds), encoding="utf-8")
-    print(f"{headline(measured)}\n{folder / REPORT}: {len(measured.outcomes)} runs in {seconds:.0f} s")
-
-
-def _with_bar(steps: Iterable[Any], total: int, unit: str) -> tqdm:
-    """The steps, with a bar on a terminal and silent elsewhere."""
-    return tqdm(steps, total=total, unit=unit, file=sys.stderr, disable=None, leave=False)
+    (folder / REPORT).write_text(to_markdown(measured, arguments.jobs, seconds), encoding="utf-8")
+    if arguments.json:
+        write_document(arguments.json, finite({"report": str(folder / REPORT), "seconds": seconds, **to_document(measured)}))
+    print(f"{headline(measured)}\n{folder / REPORT}: {len(measured.outcomes)} runs in {seconds:.0f} s",
+          file=words_for(arguments.json))

@@ -29,7 +29,7 @@ from .paper_runs import (
     picture_name,
     planned,
 )
-from .plots import DPI, GOAL, PATH, Drawing, draw, planner_title
+from .plots import DPI, GOAL, PATH, Drawing, decorate, draw, planner_title
 
 FORMATS = (".png", ".svg")
 #: Two colours of Okabe and Ito's palette, and shapes for those who see neither.
@@ -85,7 +85,7 @@ def _convergence(measured: Measured) -> Figure:
     """Length over samples in the maze."""
     figure = Figure(figsize=CURVES, layout="constrained")
     axes = figure.add_subplot()
-    _decorate(axes)
+    decorate(axes)
     axes.set_title(f"Path length in the {MAZE}: median and quartiles of {measured.seeds} seeds", fontsize=13, weight="bold",
                    loc="left")
     axes.set(xscale="log", xlim=(MARKS[0], 1.6 * MARKS[-1]), xlabel="samples", ylabel="length [m]")
@@ -128,7 +128,7 @@ def _question(measured: Measured) -> Figure:
 
 def _draw_panel(axes: Axes, measured: Measured, environment: str, planners: tuple[str, ...], figure_of: Callable[[Outcome], float]
                 ) -> None:
-    _decorate(axes)
+    decorate(axes)
     for planner, step_size in product(planners, STEPS):
         place = 0.0 if len(planners) == 1 else APART if planner == "rrt_star" else -APART
         _draw_kind(axes, measured, environment, planner, step_size, place, figure_of)
@@ -173,12 +173,3 @@ def _legend() -> list[Line2D]:
     titles = {UNLIMITED: "no limit to the step", LIMITED: f"steps of {LIMITED:g} m"}
     return [Line2D([], [], **_marker(planner, step_size), label=f"{planner_title(planner)}, {titles[step_size]}")
             for planner in PLANNERS for step_size in STEPS]
-
-
-def _decorate(axes: Axes) -> None:
-    axes.tick_params(labelsize=12)
-    axes.xaxis.label.set_size(13)
-    axes.yaxis.label.set_size(13)
-    axes.grid(color="#dddddd", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)

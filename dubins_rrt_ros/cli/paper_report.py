@@ -7,7 +7,7 @@ from typing import Any
 
 from dubins_rrt_ros import __version__
 
-from .bench_report import median, metres, milliseconds, spread, table
+from .bench_report import median, metres, milliseconds, quartiles, spread, table
 from .paper_answer import FOUND, WHY, found, why
 from .paper_runs import (
     CONVERGENCE,
@@ -18,6 +18,7 @@ from .paper_runs import (
     MAZE,
     MOST,
     PICTURES,
+    PLANNERS,
     QUESTION,
     ROBOT_RADIUS,
     STEPS,
@@ -86,6 +87,24 @@ def to_markdown(measured: Measured, jobs: int, seconds: float) -> str:
              _question_table(measured), _image(QUESTION, "Time to the first path, and lengths, by headings and step size"),
              _prose(FOUND, **found(measured)), _prose(WHY, **why(measured)), _prose(NOTE), _prose(made)]
     return "\n\n".join(parts) + "\n"
+
+
+def to_document(measured: Measured) -> dict[str, Any]:
+    """The report's tables and its answer as what JSON can hold, but for what is infinite; seconds and metres."""
+    table = [{"samples": samples, "paper": dict(zip(PLANNERS, PAPERS[samples], strict=True)),
+              **{planner: _figures(measured.of(MAZE, planner, samples)) for planner in PLANNERS}} for samples in TABLE]
+    question = [{"environment": environment, "heading_sampling": headings, "step_size": step_size,
+                 **{planner: _figures(measured.of(environment, planner, headings=headings, step_size=step_size))
+                    for planner in PLANNERS}}
+                for environment, headings, step_size in product(ENVIRONMENTS, HEADINGS, STEPS)]
+    return {"seeds": measured.seeds, "table": table, "question": question, "version": __version__,
+            "answer": [_prose(FOUND, **found(measured)), _prose(WHY, **why(measured))]}
+
+
+def _figures(runs: list[Outcome]) -> dict[str, Any]:
+    return {"runs": len(runs), "solved": sum(run.solved for run in runs), "length": quartiles(run.length for run in runs),
+            "time_to_first": quartiles(run.time_to_first for run in runs),
+            "samples_to_first": quartiles(run.samples_to_first for run in runs)}
 
 
 def _prose(template: str, **values: Any) -> str:

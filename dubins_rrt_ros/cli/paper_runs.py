@@ -145,11 +145,11 @@ def planned(run: Run, on_progress: Callable[[Progress], None] = lambda progress:
     """The plan of a run: Algorithms 1 and 2, with none of what goes beyond them."""
     settings = Settings(planner=run.planner, samples=run.samples, planning_time=NO_LIMIT, step_size=run.step_size,
                         heading_sampling=run.headings, informed=False, shortcut=False, seed=run.seed)
-    return plan(_problem(run.environment), settings, on_progress=on_progress)
+    return plan(problem_in(run.environment), settings, on_progress=on_progress)
 
 
 @lru_cache
-def _problem(environment: str) -> Problem:
+def problem_in(environment: str) -> Problem:
     """The environment with the start and the goal that its file names, ready to plan in."""
     file = find_map(f"{environment}.geojson")
     poses = json.loads(file.read_text(encoding="utf-8"))

@@ -13,9 +13,15 @@ from tqdm import tqdm
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
 
-from .flags import UsageError, add_option_flags, given_options
-from .output import STDOUT, check_drawing, check_folder, write_csv, write_json
+from .flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .output import check_drawing, check_folder, words_for, write_csv, write_json
 from .request import MAX_MAP_CELLS, Request, read_map, read_replay
+
+EXAMPLES = ("dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --plot maze.png",
+            "dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --planner rrt --json plan.json",
+            "dubins_rrt plan --replay plan.json",
+            "dubins_rrt plan parking.geojson --start 2.5 8.75 0 --goal 22 4.1 -1.5708 --turning-radius 5 \\",
+            "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'")
 
 
 class _Replay(argparse.Action):
@@ -33,8 +39,11 @@ class _Replay(argparse.Action):
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser("plan", help="plan a path on a map",
-                                   description="Plans a path on a map, prints its figures and writes it to files.")
+    parser = add_command(subparsers, "plan", usage="MAP --start X Y YAW --goal X Y YAW [options]", help="plan a path on a map",
+                         description="Plans a path on a map, prints its figures and writes it to files.", examples=EXAMPLES,
+                         notes="The first Ctrl-C ends the search with the best path so far.",
+                         exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, "
+                                     "130 interrupted")
     pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW"), "required": True, "default": argparse.SUPPRESS}
     request = (parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
                                    help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze"),
@@ -42,7 +51,7 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                parser.add_argument("--goal", **pose, help="where it shall be [m, m, rad]"))
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
-    parser.add_argument("--json", metavar="FILE", help="write the plan, also without a path; - is standard output")
+    add_json_flag(parser, "the plan, also without a path,")
     parser.add_argument("--csv", metavar="FILE", help="write the path's poses as x,y,theta")
     parser.add_argument("--plot", metavar="FILE", help="draw map, tree and path; .png, .svg or .pdf")
     parser.add_argument("--replay", metavar="FILE", action=_Replay, holds=request,
@@ -58,10 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.json, arguments.csv, arguments.plot)
     check_drawing(arguments.plot)
     request = _request(arguments)
-    with _interrupt() as cancel, _progress_bar(request.settings.samples) as on_progress:
+    with _interrupt() as cancel, _progress_bar(request.settings) as on_progress:
         answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
     answer = replace(answer, map_time=answer.map_time + request.load_time)
-    _report(answer, request, sys.stderr if arguments.json == STDOUT else sys.stdout)
+    _report(answer, request, words_for(arguments.json))
     _write(answer, request.map_name, arguments)
     return 0 if answer.path else 1
 
@@ -100,12 +109,12 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
 
 
 @contextlib.contextmanager
-def _progress_bar(samples: int) -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal; nothing elsewhere."""
-    with tqdm(total=samples, unit=" samples", file=sys.stderr, disable=None, leave=False) as bar:
+def _progress_bar(settings: Settings) -> Iterator[Callable[[Progress], None]]:
+    """A bar on a terminal, with the best length and the time limit; nothing elsewhere."""
+    with tqdm(total=settings.samples, unit=" samples", file=sys.stderr, disable=None, leave=False) as bar:
         def show(progress: Progress) -> None:
-            if progress.length is not None:
-                bar.set_postfix_str(f"path {progress.length:.2f} m", refresh=False)
+            best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
+            bar.set_postfix_str(f"{best}, limit {settings.planning_time:g} s", refresh=False)
             bar.update(progress.samples - bar.n)
 
         yield show

@@ -27,6 +27,8 @@ DPI = 160
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
 #: The height of a line below the title [inch], and how many of its letters go into an inch.
 LINE, LETTERS = 0.19, 13.5
+#: By how much the edge of what a disc sweeps may be off, in its radii.
+FLAT = 0.01
 
 
 class Drawing(NamedTuple):
@@ -92,23 +94,49 @@ def _duration(seconds: float) -> str:
 
 def draw(file: str, drawing: Drawing) -> None:
     """Draw into a file of the format of its name's ending."""
-    low, high = _view(drawing.map)
-    figure, axes = _canvas(low, high, drawing)
-    _draw_map(axes, drawing.map)
+    figure, axes = _canvas(drawing)
+    draw_on(axes, drawing)
+    figure.savefig(file, dpi=DPI)
+
+
+def draw_on(axes: Axes, drawing: Drawing) -> None:
+    """Draw all but the titles on axes that `frame` has fitted to the map."""
+    draw_map(axes, drawing.map)
     # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
     axes.add_collection(LineCollection(drawing.tree, colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
     _draw_path(axes, drawing)
-    reach = drawing.vehicle.robot_radius
-    arrow = max(2.2 * drawing.vehicle.inner_radius, 0.045 * (high - low).max())
-    _draw_pose(axes, drawing.start, START, drawing.vehicle, arrow)
-    _draw_pose(axes, drawing.goal, GOAL, drawing.vehicle, arrow)
-    # Behind the start and ahead of the goal, where no path runs.
-    beside = max(1.3 * drawing.vehicle.inner_radius, 0.3 * arrow)
-    _draw_name(axes, "start", drawing.start, START, -max(1.1 * reach, beside), beside)
-    _draw_name(axes, "goal", drawing.goal, GOAL, max(1.1 * arrow, 1.1 * reach), max(1.1 * arrow, beside))
+    draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
     if drawing.culprit is not None:
         axes.plot(*drawing.culprit, "x", color=CULPRIT, markersize=12, markeredgewidth=3, zorder=6)
-    figure.savefig(file, dpi=DPI)
+
+
+def frame(axes: Axes, map: Map) -> None:
+    """Fit axes to a map, with equal scales and a rim of the obstacle around it."""
+    low, high = _view(map)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal", facecolor=OBSTACLE)
+    axes.ticklabel_format(useOffset=False, style="plain")
+
+
+def draw_poses(axes: Axes, start: Sequence[float], goal: Sequence[float], vehicle: Vehicle) -> None:
+    """Draw the vehicle at the start and at the goal, with arrows and names, on axes that `frame` has fitted to the map."""
+    reach = vehicle.robot_radius
+    arrow = max(2.2 * vehicle.inner_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    _draw_pose(axes, start, START, vehicle, arrow)
+    _draw_pose(axes, goal, GOAL, vehicle, arrow)
+    # Behind the start and ahead of the goal, where no path runs.
+    beside = max(1.3 * vehicle.inner_radius, 0.3 * arrow)
+    _draw_name(axes, "start", start, START, -max(1.1 * reach, beside), beside)
+    _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * reach), max(1.1 * arrow, beside))
+
+
+def decorate(axes: Axes) -> None:
+    """Give axes of curves the size of their letters, and their grid."""
+    axes.tick_params(labelsize=12)
+    axes.xaxis.label.set_size(13)
+    axes.yaxis.label.set_size(13)
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _view(map: Map) -> tuple[np.ndarray, np.ndarray]:
@@ -119,32 +147,33 @@ def _view(map: Map) -> tuple[np.ndarray, np.ndarray]:
     return low - rim, high + rim
 
 
-def _canvas(low: np.ndarray, high: np.ndarray, drawing: Drawing) -> tuple[Figure, Axes]:
+def _canvas(drawing: Drawing) -> tuple[Figure, Axes]:
     """A figure cut to the shape of the view, so that equal axes leave no blank, and its title."""
+    low, high = _view(drawing.map)
     width, height = MAP_SIDE * (high - low) / (high - low).max()
     across = max(width + LEFT + RIGHT, WIDTH)
     lines = textwrap.wrap(drawing.subtitle, int(LETTERS * (across - LEFT)))
     up = height + BOTTOM + TOP + LINE * len(lines)
     figure = Figure(figsize=(across, up))
-    axes = figure.add_axes((LEFT / across, BOTTOM / up, width / across, height / up), facecolor=OBSTACLE)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes = figure.add_axes((LEFT / across, BOTTOM / up, width / across, height / up))
+    frame(axes, drawing.map)
     axes.tick_params(labelsize=9)
-    axes.ticklabel_format(useOffset=False, style="plain")
     figure.text(LEFT / across, 1 - 0.16 / up, drawing.title, fontsize=13, weight="bold", va="top")
     figure.text(LEFT / across, 1 - 0.42 / up, "\n".join(lines), fontsize=10, color="#444444", va="top")
     return figure, axes
 
 
-def _draw_map(axes: Axes, map: Map) -> None:
+def draw_map(axes: Axes, map: Map, free: str = FREE) -> None:
+    """Draw what is free, in a colour, and what is unknown on axes that `frame` has fitted to the map."""
     if isinstance(map, GridMap):
-        _draw_grid(axes, map)
+        _draw_grid(axes, map, free)
     else:
-        axes.add_patch(PathPatch(_outline(map.free), facecolor=FREE, edgecolor="none", zorder=1))
+        axes.add_patch(PathPatch(_outline(map.free), facecolor=free, edgecolor="none", zorder=1))
 
 
-def _draw_grid(axes: Axes, grid: GridMap) -> None:
+def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
     classes = np.where(grid.data >= OCCUPIED_FROM, 2, grid.blocked(allow_unknown=False).astype(int))
-    colours = np.array([list(bytes.fromhex(colour[1:])) for colour in (FREE, UNKNOWN, OBSTACLE)], dtype=np.uint8)
+    colours = np.array([list(bytes.fromhex(colour[1:])) for colour in (free, UNKNOWN, OBSTACLE)], dtype=np.uint8)
     x, y, yaw = grid.origin
     view = axes.axis()
     axes.imshow(colours[classes], origin="lower", extent=(0, grid.size[0], 0, grid.size[1]), zorder=1,
@@ -176,7 +205,8 @@ def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
     """What the vehicle covers along a path, with straight lines from pose to pose."""
     if not vehicle.outline:
         line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
-        return line.buffer(vehicle.robot_radius)
+        # Without the corners that are too flat to see, and most of the file.
+        return line.buffer(vehicle.robot_radius).simplify(FLAT * vehicle.robot_radius)
     bodies = [_body(vehicle, pose) for pose in path]
     return shapely.union_all([shapely.union(*pair).convex_hull for pair in pairwise(bodies)] or bodies)
 

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
 
-from .flags import UsageError
+from .flags import UsageError, add_command, add_json_flag
+from .output import check_folder, words_for, write_document
+from .request import find_map
 
 #: Each cell is a polygon while it is judged, a few hundred bytes.
 MAX_CELLS = 4_000_000
@@ -14,28 +16,39 @@ MAX_CELLS = 4_000_000
 
 def add_to(subparsers: argparse._SubParsersAction) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "render", help="make a map_server pair of a polygon map",
+    parser = add_command(
+        subparsers, "render", usage="MAP [options]", help="make a map_server pair of a polygon map",
         description="Makes the grid of a polygon map and writes it as map_server's YAML and image. A cell is occupied "
-                    "where it meets an obstacle, be it with a corner.")
-    parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt)")
+                    "where it meets an obstacle, be it with a corner.",
+        examples=["dubins_rrt render maze.geojson --resolution 0.1 --out grids", "dubins_rrt plan grids/maze.yaml "
+                  "--start 1.5 2 1.57 --goal 13.5 10.5 1.57"],
+        exit_status="0 done, 2 wrong usage")
+    parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt), or an installed one's name")
     parser.add_argument("--resolution", metavar="m", type=float, default=0.05,
                         help="the side of a cell [m]; default 0.05")
-    parser.add_argument("--out", metavar="DIR", help="where to write; by default beside the polygon map")
+    parser.add_argument("--out", metavar="DIR", help="where to write; by default beside the polygon map, and the pair of an "
+                                                     "installed one here")
+    add_json_flag(parser, "the files' names, and the grid's measures,")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the pair and say so."""
-    source = Path(arguments.map)
-    folder = Path(arguments.out) if arguments.out else source.parent
+    check_folder(arguments.json)
+    source = find_map(arguments.map)
+    folder = Path(arguments.out or (source.parent if Path(arguments.map).is_file() else "."))
     grid = rasterise(_polygons(source, arguments.resolution), arguments.resolution)
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / f"{source.stem}.yaml"
     save_map(grid, written)
     rows, columns = grid.data.shape
-    print(f"{written} and its image: {columns} x {rows} cells of {grid.resolution:g} m, "
-          f"{(grid.data > 0).mean():.0%} of them occupied")
+    occupied = float((grid.data > 0).mean())
+    if arguments.json:
+        write_document(arguments.json, {"files": [str(written), str(written.with_suffix(".pgm"))], "width": columns,
+                                        "height": rows, "resolution": grid.resolution, "origin": list(grid.origin),
+                                        "occupied": occupied, "map_id": grid.id})
+    print(f"{written} and its image: {columns} x {rows} cells of {grid.resolution:g} m, {occupied:.0%} of them occupied",
+          file=words_for(arguments.json))
     return 0
 
 

@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dubins_rrt_ros import share
 from dubins_rrt_ros.planning import Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.path import Path as DrivenPath
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
-from dubins_rrt_ros.share import find_map, maps_directory
+from dubins_rrt_ros.share import maps_directory
+
+from .flags import near_miss
 
 MAX_MAP_CELLS = 100_000_000
 
@@ -32,6 +35,20 @@ class Request(NamedTuple):
     load_time: float
     source: str = ""
     path: DrivenPath | None = None
+
+
+def find_map(name: str) -> Path:
+    """The file of a map.
+
+    Raises:
+        MapNotFound: there is none; the message names an installed one with a like name.
+    """
+    try:
+        return share.find_map(name)
+    except MapNotFound as error:
+        own = {file.stem: file.name for ending in ("wkt", "geojson") for file in maps_directory().glob(f"*.{ending}")}
+        own |= {file.stem: file.stem for file in maps_directory().glob("*.yaml")}
+        raise MapNotFound(f"{error}{near_miss(Path(name).stem, own.values())}") from None
 
 
 def read_map(name: str, max_map_cells: int) -> tuple[Map, float]:

@@ -26,7 +26,7 @@ PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform", "p
 def folder(tmp_path_factory):
     """What the command writes for two seeds."""
     folder = tmp_path_factory.mktemp("paper") / "results"
-    assert main(["paper", "--out", str(folder), "--seeds", "2", "--jobs", "2"]) == 0
+    assert main(["paper", "--out", str(folder), "--seeds", "2", "--jobs", "2", "--json", str(folder.parent / "answer.json")]) == 0
     return folder
 
 
@@ -99,6 +99,22 @@ def test_rrt_with_headings_towards_the_goal_never_passes_the_second_wall(folder,
     """As the report explains."""
     assert all(lengths[Run("maze", "rrt", 3000, "goal", 0.0, seed)] is None for seed in (0, 1))
     assert "finds a path through the maze with 0 of 2 seeds" in " ".join((folder / "report.md").read_text().split())
+
+
+@needs_compiled
+def test_json_holds_the_tables_and_the_answer(folder, lengths):
+    document = json.loads((folder.parent / "answer.json").read_text())
+    assert document["report"] == str(folder / "report.md") and document["seeds"] == 2
+    assert [row["samples"] for row in document["table"]] == list(TABLE)
+    last = document["table"][-1]
+    shorter, longer = sorted(lengths[Run("maze", "rrt_star", 3000, "uniform", 0.0, seed)] for seed in (0, 1))
+    assert last["rrt_star"]["length"] == {"lower_quartile": shorter, "median": shorter, "upper_quartile": longer}
+    assert last["paper"] == {"rrt": 22.54, "rrt_star": 20.26} and last["rrt"]["runs"] == last["rrt"]["solved"] == 2
+    stuck, = (row["rrt"] for row in document["question"]
+              if (row["environment"], row["heading_sampling"], row["step_size"]) == ("maze", "goal", 0))
+    assert stuck["solved"] == 0 and stuck["length"]["median"] is stuck["samples_to_first"]["median"] is None
+    assert len(document["question"]) == 18 and len(document["answer"]) == 2
+    assert all(text in (folder / "report.md").read_text() for text in document["answer"])
 
 
 def test_rrt_with_fewer_samples_has_what_it_found_by_then():

@@ -204,7 +204,7 @@ def _read(terminal, process, interrupt_at):
 def test_a_terminal_sees_a_bar(hall):
     status, out, shown = on_a_terminal([hall, *REQUEST, *BUDGET])
     assert status == 0 and "150 samples" in out
-    assert "/150" in shown and "%" in shown
+    assert "/150" in shown and "%" in shown and "limit 60 s" in shown
 
 
 def test_ctrl_c_gives_the_best_path_so_far(hall):

@@ -1,0 +1,163 @@
+"""`dubins_rrt completion`: the script with which a shell completes the commands, flags, map names and files of `dubins_rrt`.
+
+All words are written into the script: to ask the program at each press of the tab key, as argcomplete does, takes a second of
+imports. The names of maps alone are listed when they are asked for.
+"""
+
+import argparse
+import re
+import shlex
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+from dubins_rrt_ros.share import maps_directory
+
+from .flags import add_command
+
+#: What is completed where the help asks for these.
+_KINDS = {"MAP": "@map", "DIR": "@folder", "FILE": "@file", "PATH.json": "@file", "PROBLEMS.json": "@file"}
+#: How many words a flag takes that takes any number.
+_MANY = 999
+
+_BASH = """\
+# Completes dubins_rrt.
+_dubins_rrt_place() {  # what may stand at a place of a command, and for how many words
+    offer=@flags left=0
+    case $1 in
+PLACES
+    esac
+}
+_dubins_rrt() {
+    local IFS=$' \\t\\n' word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]} flags= offer= left=0 place=1 i
+    if ((COMP_CWORD == 1)); then
+        COMPREPLY=($(compgen -W 'COMMANDS' -- "$word"))
+        return
+    fi
+    for ((i = 2; i < COMP_CWORD; i++)); do
+        case ${COMP_WORDS[i]} in
+            =) ;;  # bash cuts --flag=value there
+            -[a-z-]*) _dubins_rrt_place "$command ${COMP_WORDS[i]}" ;;
+            *) if ((left > 0)); then ((left -= 1)); else ((place += 1)); fi ;;
+        esac
+    done
+    [[ $word == = ]] && word=
+    case $command in
+FLAGS
+    esac
+    ((left > 0)) || _dubins_rrt_place "$command $place"
+    [[ $word == -[a-z-]* || $word == - ]] && offer=@flags
+    COMPREPLY=()
+    case $offer in
+        @file) ;;  # the shell's own way
+        @folder) IFS=$'\\n' COMPREPLY=($(compgen -d -- "$word")) ;;
+        @map) IFS=$'\\n' COMPREPLY=($(compgen -W "$(MAPS)" -- "$word") $(compgen -f -- "$word")) ;;
+        @flags) COMPREPLY=($(compgen -W "$flags" -- "$word")) ;;
+        *) COMPREPLY=($(compgen -W "$offer" -- "$word")) ;;
+    esac
+    [[ $offer == @map || $offer == @folder ]] && compopt -o filenames 2>/dev/null
+    [[ $offer == @file ]] || compopt +o default 2>/dev/null
+    return 0
+}
+complete -o default -F _dubins_rrt dubins_rrt"""
+
+_ZSH = """\
+(( $+functions[compdef] )) || { autoload -Uz compinit && compinit; }
+autoload -Uz bashcompinit && bashcompinit"""
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subparsers, "completion", usage="bash|zsh|fish", help="let the tab key complete commands, flags and map names",
+        description="Prints a script that completes commands, flags with their choices, names of installed maps, and files. "
+                    "The first example does so in this bash alone, the others in each that is started from now on.",
+        notes="In zsh it is `source <(dubins_rrt completion zsh)`, in fish `dubins_rrt completion fish | source`.",
+        examples=['eval "$(dubins_rrt completion bash)"', "mkdir -p ~/.local/share/bash-completion/completions",
+                  "dubins_rrt completion bash > ~/.local/share/bash-completion/completions/dubins_rrt"],
+        exit_status="0 done, 2 wrong usage")
+    parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+    parser.set_defaults(run=partial(run, subparsers))
+
+
+def run(subparsers: argparse._SubParsersAction, arguments: argparse.Namespace) -> int:
+    """Print the script."""
+    print("\n".join({"bash": _bash, "zsh": _zsh, "fish": _fish}[arguments.shell](subparsers)))
+    return 0
+
+
+class _Place(NamedTuple):
+    """Where a command takes words.
+
+    Attributes:
+        names: of the flag that they follow; or the number of the place, where they follow none.
+        words: how many; none after a switch.
+        offer: what may stand there: words, or @map, @file or @folder, or nothing that is known.
+        help: the first clause of the help.
+    """
+
+    names: list[str]
+    words: int
+    offer: str
+    help: str
+
+
+def _places(parser: argparse.ArgumentParser) -> Iterator[_Place]:
+    number = 0
+    for action in parser._actions:
+        number += not action.option_strings
+        words = {None: 1, "?": 1, "+": _MANY}.get(action.nargs, action.nargs)
+        offer = " ".join(action.choices or [_KINDS.get(action.metavar, "")])
+        yield _Place(list(action.option_strings) or [str(number)], words, offer, re.split(r" \[| \(|[;:,]", action.help or "")[0])
+
+
+def _flags(parser: argparse.ArgumentParser) -> list[str]:
+    return [name for place in _places(parser) for name in place.names if name.startswith("--")]
+
+
+def _list_maps() -> str:
+    """The shell command that lists the installed maps, those of today and those that come."""
+    return f"command ls {shlex.quote(str(maps_directory()))} 2>/dev/null | sed -n 's/[.]yaml$//p; /[.]geojson$/p; /[.]wkt$/p'"
+
+
+def _bash(subparsers: argparse._SubParsersAction) -> Iterator[str]:
+    commands = subparsers.choices
+    places = (f"        {' | '.join(repr(f'{command} {name}') for name in place.names)}) "
+              f"offer={shlex.quote(place.offer)} left={place.words} ;;"
+              for command, parser in commands.items() for place in _places(parser) if place.words)
+    flags = (f"        {command}) flags='{' '.join(_flags(parser))}' ;;" for command, parser in commands.items())
+    parts = {"PLACES": "\n".join(places), "FLAGS": "\n".join(flags), "MAPS": _list_maps(),
+             "COMMANDS": " ".join([*commands, "--help", "--version"])}
+    yield re.sub("|".join(parts), lambda match: parts[match[0]], _BASH)
+
+
+def _zsh(subparsers: argparse._SubParsersAction) -> Iterator[str]:
+    """The script of bash, which zsh can read."""
+    yield _ZSH
+    yield from _bash(subparsers)
+
+
+def _fish(subparsers: argparse._SubParsersAction) -> Iterator[str]:
+    yield "complete -c dubins_rrt -f"
+    for choice in subparsers._choices_actions:
+        yield f"complete -c dubins_rrt -n __fish_use_subcommand -a {choice.dest} -d {_fish_quoted(choice.help)}"
+    for command, parser in subparsers.choices.items():
+        condition = f"complete -c dubins_rrt -n '__fish_seen_subcommand_from {command}'"
+        for place in _places(parser):
+            flags = "".join(f" -l {name[2:]}" for name in place.names if name.startswith("--"))
+            help = f" -d {_fish_quoted(place.help)}" if flags else ""
+            yield condition + flags + (" -r" if flags and place.words else "") + _fish_offer(place) + help
+
+
+def _fish_offer(place: _Place) -> str:
+    """The options of `complete` for what may stand at a place."""
+    if not place.words:
+        return ""
+    files, words = {"": ("-f", ""), "@file": ("-F", ""), "@folder": ("-f", "(__fish_complete_directories)"),
+                    "@map": ("-F", f"({_list_maps()})")}.get(place.offer, ("-f", place.offer))
+    return f" {files} -a {_fish_quoted(words)}" if words else f" {files}"
+
+
+def _fish_quoted(text: str) -> str:
+    backslash, quote = "\\", "'"
+    return quote + text.replace(backslash, backslash * 2).replace(quote, backslash + quote) + quote
