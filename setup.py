@@ -37,6 +37,7 @@ setup(
     version="0.1.0",
     description="Dubins RRT and RRT* for ROS 2: collision-free paths for vehicles that cannot turn on the spot",
     author="dubins_rrt_ros maintainers",
+    maintainer="dubins_rrt_ros maintainers",
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),

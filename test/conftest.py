@@ -1,15 +1,14 @@
-"""What holds for all tests: which kernels they run on, and hypothesis' profiles."""
+"""What holds for all tests: which package and which kernels they run on, and hypothesis' profiles."""
 
 import os
+import signal
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-import dubins_rrt_ros
-from dubins_rrt_ros.planning import kernels_compiled
-
-KERNELS = "compiled" if kernels_compiled else "interpreted"
+SOURCE = Path(__file__).resolve().parent.parent
 
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -26,12 +25,40 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     settings.register_profile("fuzz", max_examples=config.getoption("--fuzz"), suppress_health_check=list(HealthCheck))
+    if _is_sourced():
+        # `colcon test` runs `python -m pytest`, which would find the source tree first.
+        sys.path[:] = [entry for entry in sys.path if Path(entry).resolve() != SOURCE]
+    if _package().parent != SOURCE:
+        # The Pythons that tests start in the source tree find what is tested, too.
+        os.environ["PYTHONSAFEPATH"] = "1"
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        # As in the background of a shell: what the tests start would inherit it, and not end by Ctrl-C.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     wanted = config.getoption("--kernels")
-    if wanted not in ("any", KERNELS):
+    if wanted not in ("any", _kernels()):
         remedy = ("build them with `python setup.py build_ext --inplace`" if wanted == "compiled"
                   else "remove the extension modules from planning/_kernels")
-        pytest.exit(f"--kernels asks for {wanted} kernels, but the {KERNELS} ones are in use; {remedy}.", returncode=1)
+        pytest.exit(f"--kernels asks for {wanted} kernels, but the {_kernels()} ones are in use; {remedy}.", returncode=1)
 
 
 def pytest_report_header():
-    return [f"kernels: {KERNELS}", f"package: {Path(dubins_rrt_ros.__file__).parent}"]
+    return [f"kernels: {_kernels()}", f"package: {_package()}"]
+
+
+def _is_sourced() -> bool:
+    """Whether the package is in a colcon workspace, or in a ROS installation, that is sourced."""
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return any(Path(prefix, "share/dubins_rrt_ros").is_dir() for prefix in prefixes)
+
+
+def _package() -> Path:
+    """The folder of the package that is tested."""
+    import dubins_rrt_ros  # here, for it takes the path of modules as pytest_configure() leaves it
+
+    return Path(dubins_rrt_ros.__file__).resolve().parent
+
+
+def _kernels() -> str:
+    from dubins_rrt_ros.planning import kernels_compiled
+
+    return "compiled" if kernels_compiled else "interpreted"

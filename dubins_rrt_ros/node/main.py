@@ -14,6 +14,7 @@ from rclpy.utilities import remove_ros_args
 from dubins_rrt_ros.planning import MapError, OptionError
 
 from .parameter_files import as_yaml, unused_files
+from .parameter_table import as_table
 from .parameters import OPTIONS
 from .planner_node import PlannerNode
 
@@ -54,8 +55,8 @@ def _give_memory_back() -> None:
 def _run(arguments: list[str]) -> int:
     node = executor = None
     try:
-        if _parse(arguments).print_parameters:
-            print(as_yaml(), end="")
+        if printed := _parse(arguments).printed:
+            print(printed(), end="")
             return 0
         node = _configured_node(arguments)
         executor = SingleThreadedExecutor()
@@ -112,9 +113,13 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     lines = [f"  {item.name} (default {item.default!r}): {item.describe()}" for item in OPTIONS.values()]
     parser = argparse.ArgumentParser(
         prog="planner", description="Plan Dubins paths from start_pose to each goal_pose on a map, with RRT or RRT*.",
-        usage="%(prog)s [--help] [--print-parameters] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
+        usage="%(prog)s [--help] [--print-parameters | --parameter-table] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
         epilog="\n".join(["parameters:", *lines]), formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--print-parameters", action="store_true", help="print a parameter file with all defaults and exit")
+    printing = parser.add_mutually_exclusive_group()
+    printing.add_argument("--print-parameters", action="store_const", dest="printed", const=as_yaml,
+                          help="print a parameter file with all defaults and exit")
+    printing.add_argument("--parameter-table", action="store_const", dest="printed", const=as_table,
+                          help="print a table of all parameters in Markdown and exit")
     try:
         own = remove_ros_args(arguments)[1:]
     except RuntimeError as error:

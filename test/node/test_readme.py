@@ -1,15 +1,28 @@
-"""The README's client, as it stands there, against the installed planner."""
+"""What README.md says of the node: its client, as it stands there, and its tables."""
 
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+from dubins_rrt_ros.planning import Status
+
+README = (Path(__file__).resolve().parents[2] / "README.md").read_text("utf-8")
+#: What every node of rclpy has, and one that listens to transforms, by the last part of its name.
+OF_EVERY_NODE = {"parameter_events", "rosout", "clock", "tf", "tf_static", "describe_parameters", "get_parameter_types",
+                 "get_parameters", "list_parameters", "set_parameters", "set_parameters_atomically", "get_type_description"}
+
+
+def table(*columns):
+    """The cells of each row of the table whose first columns have these headings."""
+    head = re.escape(f"| {' | '.join(columns)} |")
+    found = re.search(rf"^{head}.*\n\|[-|: ]+\n((?:\|.*\n)+)", README, re.MULTILINE)
+    assert found, f"README.md has no table with the columns {', '.join(columns)}"
+    return [[cell.strip() for cell in row.strip("|").split(" | ")] for row in found[1].splitlines()]
 
 
 def test_the_example_client_gets_its_path(planners):
-    block = re.search(r"<!-- example client -->\n```python\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
+    block = re.search(r"<!-- example client -->\n```python\n(.*?)```", README, re.DOTALL)
     process = planners.start(map_file="maze", seed=1)
     process.wait_until_ready()
     namespace = process.name.removesuffix("/planner")
@@ -17,3 +30,46 @@ def test_the_example_client_gets_its_path(planners):
                           capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"Path of \d\d\.\d\d m.* [1-9]\d\d poses\n", done.stdout), done.stdout + process.output
+
+
+def test_the_table_of_parameters_is_the_one_that_is_printed(planners):
+    process = planners.start("--", "--parameter-table")
+    assert process.wait() == 0
+    written = re.findall("<!-- parameters -->\n(.*?)<!-- end of parameters -->", README, re.DOTALL)
+    remedy = "put what `planner --parameter-table` prints between <!-- parameters --> and <!-- end of parameters -->"
+    assert [table.strip() for table in written] == [process.output.strip()], remedy
+
+
+def test_the_table_of_error_codes_is_that_of_the_statuses():
+    rows = [(codes.split(", "), names.split(", ")) for codes, names, *_ in table("code", "name")]
+    told = {int(code): name for codes, names in rows for code, name in zip(codes, names, strict=True)}
+    assert told == {int(status): status.name for status in Status}
+
+
+def test_the_table_of_topics_and_services_is_what_a_running_node_has(planners):
+    told = {(direction, name.strip("`"), kind) for direction, name, kind, *_ in table("direction", "name", "type")}
+    has = set()
+    for parameters, other_map in (({"map_file": "block"}, ("in", "map")), ({}, ("out", "map"))):
+        planners.start(**parameters)
+        client, wanted = planners.client(), {row[:2] for row in told} - {other_map}
+        client.wait_for(lambda client=client, wanted=wanted: {row[:2] for row in names_of(client.node)} >= wanted,
+                        f"node that has all of {sorted(wanted)}")
+        has |= names_of(client.node)
+    assert has == told
+
+
+def names_of(node):
+    """Direction, name and type of all that the planner in a client's namespace has, as the README writes them."""
+    if ("planner", node.get_namespace()) not in node.get_node_names_and_namespaces():
+        return set()  # not yet
+    looks = {"in": node.get_subscriber_names_and_types_by_node, "out": node.get_publisher_names_and_types_by_node,
+             "service": node.get_service_names_and_types_by_node}
+    return {(direction, written(name, node.get_namespace()), re.sub("/(msg|srv)/", "/", kind))
+            for direction, look in looks.items() for name, (kind,) in look("planner", node.get_namespace())
+            if name.rpartition("/")[2] not in OF_EVERY_NODE}
+
+
+def written(name, namespace):
+    """A name without the node's namespace, and without its own name."""
+    name = name.removeprefix(f"{namespace}/")
+    return name.replace("planner/", "~/", 1) if name.startswith("planner/") else name

@@ -80,6 +80,7 @@ def test_proves_that_there_is_no_way(planner, map):
     assert len(result.tree) == 1
 
 
+@needs_compiled
 def test_a_tolerance_may_reach_around_the_wall(planner):
     """The goal's disc reaches through the wall to the start's side, so nothing is proved and a path is found."""
     goal = (1.0, -8.0, 0.0)
@@ -149,6 +150,7 @@ def test_unknown_space_is_named_as_the_cause(planner):
     assert plan(allowed, settings(planner)).status == Status.NONE
 
 
+@needs_compiled
 @pytest.mark.parametrize("goal", [(10.1, 3.0, 0.5), (0.0, -3.0, 0.5), (0.3, 3.0, -2.0)])
 @pytest.mark.parametrize("any_heading", [False, True])
 def test_the_tolerance_excuses_a_goal_outside_or_in_an_obstacle(planner, goal, any_heading):
