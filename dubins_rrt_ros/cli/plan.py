@@ -111,10 +111,11 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
 @contextlib.contextmanager
 def _progress_bar(settings: Settings) -> Iterator[Callable[[Progress], None]]:
     """A bar on a terminal, with the best length and the time limit; nothing elsewhere."""
-    with tqdm(total=settings.samples, unit=" samples", file=sys.stderr, disable=None, leave=False) as bar:
+    limit = f"limit {settings.planning_time:g} s"
+    with tqdm(total=settings.samples, unit=" samples", file=sys.stderr, disable=None, leave=False, postfix=limit) as bar:
         def show(progress: Progress) -> None:
             best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
-            bar.set_postfix_str(f"{best}, limit {settings.planning_time:g} s", refresh=False)
+            bar.set_postfix_str(f"{best}, {limit}", refresh=False)
             bar.update(progress.samples - bar.n)
 
         yield show
