@@ -22,7 +22,10 @@ def _share_folders(package: str) -> list[Path]:
     """Where a package's shared files may be: with colcon or apt; our own also with pip, or in the source tree."""
     folders = [prefix / "share" / package for prefix in _ament_prefixes()]
     if package == PACKAGE:
-        folders += [Path(sys.prefix) / "share" / package, Path(__file__).resolve().parent.parent]
+        here = Path(__file__).resolve()
+        # Above lib/python3.12/site-packages/dubins_rrt_ros: of a workspace, too, that was not sourced.
+        prefixes = [*here.parents[4:5], Path(sys.prefix)]
+        folders += [*(prefix / "share" / package for prefix in prefixes), here.parents[1]]
     return folders
 
 
