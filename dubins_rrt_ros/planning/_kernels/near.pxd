@@ -8,7 +8,7 @@ cdef class NearSet:
     cdef double reach
     cdef double guess
     cdef double usual
-    cdef double most_cost
+    cdef double budget
     cdef double ahead
     cdef double x
     cdef double y
@@ -23,7 +23,7 @@ cdef class NearSet:
     cdef void begin(self, double x, double y, double theta, double reach) noexcept nogil
     @cython.final
     cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
-    cdef void consider(self, int node, double dx, double dy, double bound) noexcept nogil
+    cdef void consider(self, int node, double dx, double dy, double limit) noexcept nogil
     @cython.final
     cdef void consider_bucket(self, int row, int column) noexcept nogil
     @cython.final
@@ -33,5 +33,4 @@ cdef class NearSet:
                              double within) noexcept nogil
 
 cdef class GainSet(NearSet):
-    cdef double cost
     cdef void collect_gaining(self, int node, double reach, double least_gain) noexcept nogil

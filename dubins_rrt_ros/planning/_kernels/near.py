@@ -26,7 +26,7 @@ GUESS = cython.declare(cython.double, 1.25)
 #: By what factors it is adapted how far the nearest often are: so one in five of the near sets reaches no farther.
 RISE = cython.declare(cython.double, 1.1 ** 0.2)
 FALL = cython.declare(cython.double, 1.1 ** 0.8)
-#: No bound of the cost.
+#: No limit of the cost.
 UNLIMITED = cython.declare(cython.double, 1e300)
 #: From the middle of a square to its corners, by its side; a little more.
 HALF_DIAGONAL = cython.declare(cython.double, 0.7072)
@@ -41,7 +41,8 @@ class NearSet:
     """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
 
     `keys` are the lengths of the curves; the first `count` entries of all arrays are in use. Nodes whose curve is not
-    shorter than `reach` are of no interest; it shrinks as nodes are found.
+    shorter than `reach` are of no interest; it shrinks as nodes are found. Neither are those whose curve is not shorter than
+    what their cost leaves of `budget`.
     """
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
@@ -85,7 +86,7 @@ class NearSet:
         """
         self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
         self.begin(x, y, theta, min(self.usual, within))
-        self.most_cost = most_cost
+        self.budget = most_cost
         self.consider_all()
 
     @cython.cfunc
@@ -96,7 +97,7 @@ class NearSet:
         """Empty the set and set the pose that it is about."""
         self.count = 0
         self.reach = reach
-        self.most_cost = UNLIMITED
+        self.budget = UNLIMITED
         self.x, self.y, self.theta = x, y, theta
         self.sin_theta, self.cos_theta = sin(theta), cos(theta)
 
@@ -131,13 +132,8 @@ class NearSet:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, bound: cython.double) -> cython.void:
-        """Take a node, which lies (dx, dy) from the pose, if its curve to the pose, at least `bound` long, is short enough."""
-        limit: cython.double = self.reach
-        if self.most_cost < UNLIMITED:
-            limit = min(limit, self.most_cost - self.tree.costs[node])
-            if bound >= limit:
-                return
+    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, limit: cython.double) -> cython.void:
+        """Take a node, which lies (dx, dy) from the pose, if its curve to the pose is shorter than `limit`."""
         word: cython.int
         first: cython.double
         second: cython.double
@@ -153,28 +149,29 @@ class NearSet:
     @cython.nogil
     @cython.exceptval(check=False)
     def consider_bucket(self, row: cython.int, column: cython.int) -> cython.void:
-        """Consider the nodes of a bucket that the lower bounds do not rule out."""
+        """Consider the nodes of a bucket that the lower bounds do not rule out: most by their costs and the straight line."""
         node: cython.int = self.tree.buckets[row, column]
         radius: cython.double = self.tree.radius
-        is_short: cython.bint = self.reach <= TWO_PI / 2 * radius
+        half_circle: cython.double = TWO_PI / 2 * radius
         dx: cython.double
         dy: cython.double
-        bound: cython.double
-        if node >= 0 and is_short:
+        limit: cython.double
+        if node >= 0 and self.reach <= half_circle:
             dx = self.tree.x0 + (column + 0.5) * self.tree.bucket_size - self.x
             dy = self.tree.y0 + (row + 0.5) * self.tree.bucket_size - self.y
             if takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius,
                                  HALF_DIAGONAL * self.tree.bucket_size):
                 return
         while node >= 0:
+            limit = min(self.reach, self.budget + self.ahead * self.tree.costs[node])
             dx = self.tree.poses[node, 0] - self.x
             dy = self.tree.poses[node, 1] - self.y
-            bound = max(sqrt(dx * dx + dy * dy), radius * turned(self.theta, self.tree.poses[node, 2]))
-            if bound < self.reach and not (is_short and (
-                    takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius, 0)
-                    or takes_half_circle(self.ahead * dx, self.ahead * dy, self.tree.headings[node, 0],
-                                         self.tree.headings[node, 1], radius, 0))):
-                self.consider(node, dx, dy, bound)
+            if (limit > 0 and dx * dx + dy * dy < limit * limit and radius * turned(self.theta, self.tree.poses[node, 2]) < limit
+                    and not (limit <= half_circle and (
+                        takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius, 0)
+                        or takes_half_circle(self.ahead * dx, self.ahead * dy, self.tree.headings[node, 0],
+                                             self.tree.headings[node, 1], radius, 0)))):
+                self.consider(node, dx, dy, limit)
             node = self.tree.next_in_bucket[node]
 
     @cython.cfunc
@@ -224,20 +221,19 @@ class GainSet(NearSet):
     def collect_gaining(self, node: cython.int, reach: cython.double, least_gain: cython.double) -> cython.void:
         """Find the nodes that gain more than `least_gain` by a curve shorter than `reach` from `node`."""
         self.begin(self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2], reach)
-        self.cost = self.tree.costs[node] + least_gain
+        self.budget = -(self.tree.costs[node] + least_gain)
         self.consider_all()
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, bound: cython.double) -> cython.void:
+    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, limit: cython.double) -> cython.void:
         """Take a node if it gains; where there is no more room, the others have to wait for the next chance."""
-        limit: cython.double = min(self.reach, self.tree.costs[node] - self.cost)
         word: cython.int
         first: cython.double
         second: cython.double
         third: cython.double
-        if bound >= limit or self.count >= self.keys.shape[0]:
+        if self.count >= self.keys.shape[0]:
             return
         word, first, second, third = shortest_within(
             dx, dy, self.theta, self.sin_theta, self.cos_theta,
