@@ -40,12 +40,9 @@ class Chain(NamedTuple):
     def at(self, stations: np.ndarray, radius: float) -> np.ndarray:
         """(n, 3) poses at (n,) arc lengths along the path [m]."""
         ends = np.cumsum(self.lengths[1:].sum(axis=1))
-        curve = np.minimum(np.searchsorted(ends, stations), len(ends) - 1)
+        curves = np.minimum(np.searchsorted(ends, stations), len(ends) - 1)
         out = np.empty((len(stations), 3))
-        for i in np.unique(curve):
-            on = curve == i
-            begin = ends[i - 1] if i > 0 else 0.0
-            out[on] = _poses_on(self.poses[i], self.words[i + 1], self.lengths[i + 1], radius, stations[on] - begin)
+        _dubins.chain_poses(self.poses, self.words, self.lengths, radius, curves, stations - np.append(0.0, ends)[curves], out)
         return out
 
 

@@ -18,13 +18,13 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, drive_from, turn_of
     from cython.cimports.libc.math import cos, hypot, sin
 else:
     from math import cos, hypot, sin
 
     from .clearance import Clearance
-    from .dubins import drive, turn_of
+    from .dubins import drive, drive_from, turn_of
 
 #: The gap of a body that touches an obstacle.
 CONTACT = cython.declare(cython.double, -1e300)
@@ -154,13 +154,15 @@ class PolygonBody(Body):
                      length: cython.double, moved: cython.double) -> cython.double:
         """`arc_is_free` in a turn."""
         speed: cython.double = self.speed(radius, turn)
+        sin_theta: cython.double = sin(theta)
+        cos_theta: cython.double = cos(theta)
         s: cython.double = moved / speed
         found: cython.double = self.worth
         px: cython.double
         py: cython.double
         ptheta: cython.double
         while s <= length:
-            px, py, ptheta = drive(x, y, theta, radius, turn, s)
+            px, py, ptheta = drive_from(x, y, theta, sin_theta, cos_theta, radius, turn, s)
             found = self.gap(px, py, ptheta, found)
             if found == CONTACT:
                 return -1

@@ -13,12 +13,12 @@ passes has a clearance above `need` everywhere, and one that keeps `need + margi
 import cython
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, drive_from, turn_of
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
-    from .dubins import drive, turn_of
+    from .dubins import drive, drive_from, turn_of
 
 
 @cython.cclass
@@ -72,13 +72,17 @@ class Clearance:
     def arc_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
                     length: cython.double, s: cython.double, need: cython.double) -> cython.double:
         """Walk an arc from `s` on; by how much the next sample lies beyond its end, or -1 where it hits."""
+        if s > length:
+            return s - length
+        sin_theta: cython.double = sin(theta)
+        cos_theta: cython.double = cos(theta)
         worth_exact: cython.double = need + self.margin + self.resolution
         found: cython.double
         px: cython.double
         py: cython.double
         ptheta: cython.double
         while s <= length:
-            px, py, ptheta = drive(x, y, theta, radius, turn, s)
+            px, py, ptheta = drive_from(x, y, theta, sin_theta, cos_theta, radius, turn, s)
             found = self.at_least(px, py, worth_exact)
             if found < need + self.margin:
                 return -1

@@ -77,10 +77,21 @@ def turn_of(word: cython.int, arc: cython.int) -> cython.int:
 def drive(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
           s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
     """The operators L_v, R_v and S_v of the paper: the pose after an arc of length `s`."""
+    if s == 0:
+        return x, y, theta
+    return drive_from(x, y, theta, sin(theta), cos(theta), radius, turn, s)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def drive_from(x: cython.double, y: cython.double, theta: cython.double, sin_theta: cython.double, cos_theta: cython.double,
+               radius: cython.double, turn: cython.int, s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
+    """`drive` from a pose whose sine and cosine are known."""
     if turn == 0:
-        return x + s * cos(theta), y + s * sin(theta), theta
+        return x + s * cos_theta, y + s * sin_theta, theta
     after: cython.double = theta + turn * s / radius
-    return (x + turn * radius * (sin(after) - sin(theta)), y - turn * radius * (cos(after) - cos(theta)), after)
+    return (x + turn * radius * (sin(after) - sin_theta), y - turn * radius * (cos(after) - cos_theta), after)
 
 
 @cython.cfunc
@@ -328,6 +339,22 @@ def poses_along(x: cython.double, y: cython.double, theta: cython.double, radius
     for i in range(stations.shape[0]):
         out[i, 0], out[i, 1], out[i, 2] = along(x, y, theta, radius, word, first, second, third, stations[i])
         if i > 0:
+            out[i, 2] = remainder(out[i, 2], TWO_PI)
+
+
+def chain_poses(poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], radius: cython.double,
+                curves: cython.long[::1], stations: cython.double[::1], out: cython.double[:, ::1]):
+    """Write the poses at the arc lengths `stations` of a chain's `curves` to `out` (m, 3), headings in [-pi, pi].
+
+    Curve i leads from pose i to pose i + 1, whose word and lengths are its own.
+    """
+    i: cython.Py_ssize_t
+    pose: cython.Py_ssize_t
+    with cython.nogil:
+        for i in range(curves.shape[0]):
+            pose = curves[i]
+            out[i, 0], out[i, 1], out[i, 2] = along(poses[pose, 0], poses[pose, 1], poses[pose, 2], radius, words[pose + 1],
+                                                    lengths[pose + 1, 0], lengths[pose + 1, 1], lengths[pose + 1, 2], stations[i])
             out[i, 2] = remainder(out[i, 2], TWO_PI)
 
 
