@@ -14,7 +14,7 @@ cdef class Eikonal:
     cdef int[::1] rank
     cdef int first, waiting, postponed, ordered, last
     cdef double limit, until, least_fall, rise, target_column, target_row
-    cdef bint has_target
+    cdef bint has_target, is_slowed
     cdef void seed(self, double column, double row, double reach) noexcept nogil
     cdef double straight_on(self, int node) noexcept nogil
     cdef void settle(self, int square) noexcept nogil

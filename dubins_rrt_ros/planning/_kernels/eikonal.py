@@ -53,7 +53,8 @@ class Eikonal:
         """`free` is (rows, columns) int8, not 0 for each free square; `columns` is the width."""
         self.width, self.size = free.shape[1], free.size
         self.free = free.reshape(-1)
-        self.cost, self.gradient, self.slope = np.full(free.size, FAR), np.ones(free.size), np.zeros(free.size)
+        self.cost = np.full(free.size, FAR)
+        self.is_slowed = False  # before, all gradients are 1
         self.state = np.zeros(free.size, np.int8)
         self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
         self.rank = np.full(free.size, free.size, np.int32)
@@ -84,6 +85,7 @@ class Eikonal:
     def flatten(self):
         """Make the costs lower where they are too steep, once; there must have been no target."""
         self.finish()
+        self.gradient, self.slope, self.is_slowed = np.ones(self.size), np.zeros(self.size), True
         _: cython.int
         with cython.nogil:
             levels: cython.double = self.limit * LEVELS  # no cost is above the limit, and none rises
@@ -129,7 +131,9 @@ class Eikonal:
         """How far a node is from the target, if there is one."""
         if not self.has_target:
             return 0
-        return hypot(node % self.width - self.target_column, node // self.width - self.target_row)
+        columns: cython.double = node % self.width - self.target_column
+        rows: cython.double = node // self.width - self.target_row
+        return sqrt(columns * columns + rows * rows)
 
     @cython.cfunc
     @cython.nogil
@@ -194,7 +198,7 @@ class Eikonal:
     def pass_on(self, node: cython.int, neighbour: cython.int) -> cython.void:
         """Let the cost of a node count for a neighbour that costs more."""
         if self.falls_behind(neighbour, node):
-            self.offer(neighbour, self.update(neighbour, self.gradient[neighbour]))
+            self.offer(neighbour, self.update(neighbour, self.gradient[neighbour] if self.is_slowed else 1))
 
     @cython.cfunc
     @cython.nogil
