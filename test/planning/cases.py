@@ -168,8 +168,9 @@ def chain_over(poses, radius):
 
 
 def interpreted(name):
-    """A kernel that imports no other one as the interpreter runs it, for functions that only kernels can call."""
-    spec = importlib.util.spec_from_file_location(f"interpreted_{name}", FilePath(_kernels.__file__).with_name(f"{name}.py"))
+    """A kernel that calls no other one as the interpreter runs it, for functions that only kernels can call."""
+    spec = importlib.util.spec_from_file_location(f"{_kernels.__name__}.interpreted_{name}",
+                                                  FilePath(_kernels.__file__).with_name(f"{name}.py"))
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -230,8 +230,9 @@ def test_the_heap_of_a_run_orders_as_heapq_does():
     heap = interpreted("heap").Heap
     rng = np.random.default_rng(1)
     for _ in range(scaled(200, least=20)):
-        expected, keys, item = [], heap(500), 0
+        expected, keys, item = [], heap(0), 0
         for _ in range(500):
+            keys.reserve(1)
             if expected and rng.random() < 0.4:
                 assert keys.least_key() == expected[0][0]
                 popped = keys.pop()
@@ -244,3 +245,23 @@ def test_the_heap_of_a_run_orders_as_heapq_does():
                 heapq.heappush(expected, (key, item))
                 item += 1
             assert keys.count == len(expected)
+
+
+def test_a_lattice_remembers_the_costs_of_its_cells():
+    """Poses, headings beyond pi among them, are in one cell where rows, columns and sectors by another formula are the same."""
+    rng = np.random.default_rng(2)
+    for _ in range(scaled(40, least=4)):
+        corner, extent, side = rng.uniform(-50, 50, 2), rng.uniform(0.1, 9, 2), rng.uniform(0.2, 1)
+        sectors = int(rng.integers(1, 40))
+        lattice, costs, seen = interpreted("lattice").Lattice(corner, extent, side, sectors), {}, 0
+        for pose in np.column_stack([corner + rng.random((1500, 2)) * extent, rng.uniform(-9, 9, 1500)]).tolist():
+            cell = (int((pose[0] - corner[0]) // side), int((pose[1] - corner[1]) // side),
+                    int((pose[2] % math.tau) // (math.tau / sectors)))
+            lattice.reserve(1)
+            entry = lattice.entry_at(*pose)
+            assert lattice.costs[entry] == costs.get(cell, 0)
+            seen += cell in costs
+            costs[cell] = lattice.costs[entry] = np.float32(rng.uniform(1, 9))
+        assert lattice.used == len(costs)
+        assert seen > 0
+    assert len(costs) > 1

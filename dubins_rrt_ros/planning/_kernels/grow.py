@@ -8,6 +8,8 @@ motion planning (2011), have: the parent of a new node is chosen among its near 
 import cython
 import numpy as np
 
+from .arrays import grown
+
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, shortest, turn_of
@@ -29,7 +31,7 @@ LEAST_GAIN = cython.declare(cython.double, 1e-9)
 NO_WAY = cython.declare(cython.double, 1e300)
 #: Where there is a limit to beat, one sample of so many is taken through RRT* in full, which is enough for asymptotic optimality.
 #: The others look for parents that are of use and no farther away than the nearest often are, which is much faster.
-SAMPLES_PER_FULL = cython.declare(cython.int, 16)
+SAMPLES_PER_FULL = cython.declare(cython.int, 64)
 #: By how much the sum of a step's arcs may exceed it, relatively.
 ROUNDING = cython.declare(cython.double, 1e-9)
 
@@ -100,14 +102,16 @@ class Grower:
         last: cython.int = cython.cast(cython.int, poses.shape[0]) - 1
         node: cython.int = 0
         i: cython.int
+        has_others: cython.bint = self.tree.size > 1  # those on the path itself gain nothing
         self.reserve(last)
         with cython.nogil:
             for i in range(1, last + 1):
                 if i < last or end < 0:
                     node = self.add(poses[i, 0], poses[i, 1], poses[i, 2], node, words[i],
                                     lengths[i, 0], lengths[i, 1], lengths[i, 2])
-                    self.to.collect_nearest(poses[i, 0], poses[i, 1], poses[i, 2], self.near_count(), self.longest)
-                    self.rewire(node, self.to.reach)
+                    if has_others:
+                        self.to.collect_nearest(poses[i, 0], poses[i, 1], poses[i, 2], self.near_count(), self.longest)
+                        self.rewire(node, self.to.reach)
                 elif self.tree.costs[node] + (lengths[i, 0] + lengths[i, 1] + lengths[i, 2]) < self.tree.costs[end]:
                     self.tree.reparent(end, node, words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
 
@@ -115,9 +119,7 @@ class Grower:
         """Make room for `more` nodes, so that adding them allocates nothing."""
         self.tree.reserve(more)
         if self.goal_count + more > self.goal_nodes.shape[0]:
-            grown = np.empty(2 * (self.goal_count + more), np.int32)
-            grown[:self.goal_count] = self.goal_nodes[:self.goal_count]
-            self.goal_nodes = grown
+            self.goal_nodes = grown(self.goal_nodes, 2 * (self.goal_count + more))
 
     def best_goal_node(self) -> int:
         """The cheapest node that reaches the goal, or -1."""

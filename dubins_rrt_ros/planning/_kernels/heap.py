@@ -4,6 +4,8 @@
 import cython
 import numpy as np
 
+from .arrays import grown
+
 
 @cython.cclass
 class Heap:
@@ -12,6 +14,12 @@ class Heap:
     def __init__(self, capacity):
         self.items, self.keys = np.empty(capacity, np.int32), np.empty(capacity)
         self.count = 0
+
+    def reserve(self, more: cython.int):
+        """Make room for `more` items."""
+        if self.count + more > self.keys.shape[0]:
+            capacity = self.count + max(more, self.count)
+            self.items, self.keys = grown(self.items, capacity), grown(self.keys, capacity)
 
     @cython.cfunc
     @cython.nogil

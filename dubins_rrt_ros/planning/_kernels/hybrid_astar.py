@@ -9,25 +9,28 @@ the obstacles and of the Dubins curve without them. From each pose the Dubins cu
 import cython
 import numpy as np
 
+from .arrays import grown
+
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive_from, rounding_at, shortest_within
     from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
+    from cython.cimports.dubins_rrt_ros.planning._kernels.lattice import UNSEEN, Lattice
     from cython.cimports.libc.math import cos, remainder, sin
 else:
     from math import cos, remainder, sin
 
     from .body import Body
-    from .dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within
+    from .dubins import NO_CURVE, TWO_PI, drive_from, rounding_at, shortest_within
     from .field import CostField
     from .heap import Heap
+    from .lattice import UNSEEN, Lattice
 
-#: What `best_cost` holds of a cell whose pose was expanded, and of one without a pose.
+#: What the lattice has as the cost of a cell whose pose was expanded.
 EXPANDED = cython.declare(cython.float, -1)
-UNSEEN = cython.declare(cython.float, 0)
-#: No more cells are told apart, so that large maps need no more memory: a prime, so that those taken as one lie far apart.
-MOST_CELLS = 4_194_301
+#: An expansion reaches so many poses at most.
+TURNS = cython.declare(cython.int, 3)
 
 
 @cython.cclass
@@ -43,16 +46,12 @@ class HybridAStar:
     radius: cython.double
     to_goal: CostField
     goals: cython.double[:, ::1]
-    x0: cython.double
-    y0: cython.double
+    goal_headings: cython.double[:, ::1]
     rounding: cython.double
     arc: cython.double
-    cell: cython.double
-    sectors: cython.int
-    columns: cython.longlong
-    rows: cython.longlong
     weight: cython.double
     limit: cython.double
+    most: cython.int
     size = cython.declare(cython.int, visibility="readonly")
     expanded = cython.declare(cython.int, visibility="readonly")
     ended = cython.declare(cython.bint, visibility="readonly")
@@ -60,7 +59,7 @@ class HybridAStar:
     costs: cython.double[::1]
     parents: cython.int[::1]
     turns: cython.schar[::1]
-    best_cost: cython.float[::1]
+    lattice: Lattice
     open: Heap
     last: cython.int
     last_goal: cython.int
@@ -81,39 +80,52 @@ class HybridAStar:
         """
         self.body, self.radius = body, radius
         self.to_goal, self.goals = to_goal, goals
-        self.x0, self.y0 = corner
-        self.rounding = max(rounding_at(self.x0, self.y0), rounding_at(self.x0 + extent[0], self.y0 + extent[1]))
-        self.arc, self.cell, self.sectors, self.weight, self.limit = arc, 0.7 * arc, sectors, weight, limit
-        self.columns, self.rows = int(extent[0] / self.cell) + 1, int(extent[1] / self.cell) + 1
-        self.best_cost = np.zeros(min(int(self.columns) * int(self.rows) * sectors, MOST_CELLS), np.float32)
-        room = 3 * most + 1
-        self.poses, self.costs = np.empty((room, 3)), np.empty(room)
-        self.parents, self.turns = np.empty(room, np.int32), np.empty(room, np.int8)
-        self.open = Heap(room)
+        self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
+        self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
+        self.arc, self.weight, self.limit, self.most = arc, weight, limit, most
+        self.lattice = Lattice(corner, extent, 0.7 * arc, sectors)
+        self.poses, self.costs = np.empty((0, 3)), np.empty(0)
+        self.parents, self.turns = np.empty(0, np.int32), np.empty(0, np.int8)
+        self.open = Heap(0)
         self.last_lengths = np.zeros(3)
         self.last = -1
         self.size = self.expanded = 0
         self.ended = False
+        self.reserve(1)
         self.add(start[0], start[1], start[2], 0, -1, 0, 0)
 
     def run(self, expansions: cython.int):
         """Expand up to so many poses more, fewer where the search ends."""
         _: cython.int
+        expansions = min(expansions, self.most - self.expanded)
+        self.reserve(TURNS * expansions)
         with cython.nogil:
-            for _ in range(min(expansions, self.parents.shape[0] // 3 - self.expanded)):
+            for _ in range(expansions):
                 if self.open.count == 0 or self.last >= 0:
                     break
                 self.expand(self.open.pop())
-        self.ended = self.last >= 0 or self.open.count == 0 or self.expanded == self.parents.shape[0] // 3
+        self.ended = self.last >= 0 or self.open.count == 0 or self.expanded == self.most
+
+    def reserve(self, more: cython.int):
+        """Make room for `more` poses, so that adding them allocates nothing."""
+        self.lattice.reserve(more)
+        self.open.reserve(more)
+        if self.size + more > self.parents.shape[0]:
+            capacity = self.size + max(more, self.size)
+            self.poses, self.costs = grown(self.poses, capacity), grown(self.costs, capacity)
+            self.parents, self.turns = grown(self.parents, capacity), grown(self.turns, capacity)
 
     def path(self):
         """The path that was found: (n, 3) poses from the start on, and (n,) words and (n, 3) lengths [m] of the curves to them
         from those before, the first of which mean nothing; None where there is none."""
         if self.last < 0:
             return None
-        nodes = [self.last]
-        while self.parents[nodes[0]] >= 0:
-            nodes.insert(0, self.parents[nodes[0]])
+        nodes = []
+        node: cython.int = self.last
+        while node >= 0:
+            nodes.append(node)
+            node = self.parents[node]
+        nodes.reverse()
         poses = np.concatenate([np.asarray(self.poses)[nodes], np.asarray(self.goals)[self.last_goal:self.last_goal + 1]])
         turns = np.asarray(self.turns)[nodes]
         words = np.append(np.where(turns < 0, 1, 0), self.last_word).astype(np.int8)
@@ -126,17 +138,19 @@ class HybridAStar:
     @cython.exceptval(check=False)
     def expand(self, node: cython.int) -> cython.void:
         """Try the curve to the goal, then the three arcs from a pose, unless a better one of its cell was expanded before."""
-        cell: cython.int = self.cell_of(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
-        if self.best_cost[cell] == EXPANDED:
+        entry: cython.int = self.lattice.entry_at(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
+        if self.lattice.costs[entry] == EXPANDED:
             return
-        self.best_cost[cell] = EXPANDED
+        self.lattice.costs[entry] = EXPANDED
         self.expanded += 1
         if self.reaches_goal(node):
             self.last = node
             return
-        self.extend(node, 0)
-        self.extend(node, 1)
-        self.extend(node, -1)
+        sine: cython.double = sin(self.poses[node, 2])
+        cosine: cython.double = cos(self.poses[node, 2])
+        self.extend(node, sine, cosine, 0)
+        self.extend(node, sine, cosine, 1)
+        self.extend(node, sine, cosine, -1)
 
     @cython.cfunc
     @cython.nogil
@@ -164,18 +178,20 @@ class HybridAStar:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def extend(self, node: cython.int, turn: cython.int) -> cython.void:
-        """Drive an arc from a pose; keep where it ends if that can still lead to the goal and is the best of its cell so far."""
+    def extend(self, node: cython.int, sine: cython.double, cosine: cython.double, turn: cython.int) -> cython.void:
+        """Drive an arc from a pose, whose heading has that sine and cosine; keep where it ends if that can still lead to the goal
+        and is the best of its cell so far."""
         x: cython.double
         y: cython.double
         theta: cython.double
-        x, y, theta = drive(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius, turn, self.arc)
+        x, y, theta = drive_from(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], sine, cosine, self.radius, turn,
+                                 self.arc)
         theta = remainder(theta, TWO_PI)
         if not self.body.free(x, y, theta):
             return
         cost: cython.double = self.costs[node] + self.arc
-        cell: cython.int = self.cell_of(x, y, theta)
-        seen: cython.float = self.best_cost[cell]
+        entry: cython.int = self.lattice.entry_at(x, y, theta)
+        seen: cython.float = self.lattice.costs[entry]
         if seen != UNSEEN and seen <= cost * (1 + 1e-6):
             return
         more: cython.double = self.cost_to_go(x, y, theta, self.limit - cost)
@@ -184,7 +200,7 @@ class HybridAStar:
         if not self.body.curve_is_free(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius,
                                        1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0):
             return
-        self.best_cost[cell] = cython.cast(cython.float, cost)
+        self.lattice.costs[entry] = cython.cast(cython.float, cost)
         self.add(x, y, theta, cost, node, turn, cost + self.weight * more)
 
     @cython.cfunc
@@ -209,7 +225,7 @@ class HybridAStar:
                       ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
         """The shortest curve to one of the goals, or none shorter than `limit`."""
         return shortest_within(self.goals[goal, 0] - x, self.goals[goal, 1] - y, theta, sin(theta), cos(theta),
-                               self.goals[goal, 2], sin(self.goals[goal, 2]), cos(self.goals[goal, 2]), self.radius,
+                               self.goals[goal, 2], self.goal_headings[goal, 0], self.goal_headings[goal, 1], self.radius,
                                self.rounding, limit)
 
     @cython.cfunc
@@ -223,13 +239,3 @@ class HybridAStar:
         self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = x, y, theta
         self.costs[node], self.parents[node], self.turns[node] = cost, parent, turn
         self.open.push(node, key)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def cell_of(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.int:
-        """The cell of the lattice that holds a pose of the map."""
-        column: cython.ulonglong = min(cython.cast(cython.longlong, max(x - self.x0, 0.0) / self.cell), self.columns - 1)
-        row: cython.ulonglong = min(cython.cast(cython.longlong, max(y - self.y0, 0.0) / self.cell), self.rows - 1)
-        sector: cython.int = cython.cast(cython.int, (remainder(theta, TWO_PI) / TWO_PI + 1) * self.sectors) % self.sectors
-        return cython.cast(cython.int, ((row * self.columns + column) * self.sectors + sector) % self.best_cost.shape[0])

@@ -4,6 +4,8 @@
 import cython
 import numpy as np
 
+from .arrays import grown
+
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import rounding_at
     from cython.cimports.libc.math import cos, sin, sqrt
@@ -61,16 +63,16 @@ class SearchTree:
         if self.size + more <= self.parents.shape[0]:
             return
         capacity = max(self.size + more, 2 * self.size)
-        self.poses = _grown(self.poses, capacity)
-        self.headings = _grown(self.headings, capacity)
-        self.parents = _grown(self.parents, capacity)
-        self.costs = _grown(self.costs, capacity)
-        self.words = _grown(self.words, capacity)
-        self.lengths = _grown(self.lengths, capacity)
-        self.first_child = _grown(self.first_child, capacity)
-        self.next_sibling = _grown(self.next_sibling, capacity)
-        self.previous_sibling = _grown(self.previous_sibling, capacity)
-        self.next_in_bucket = _grown(self.next_in_bucket, capacity)
+        self.poses = grown(self.poses, capacity)
+        self.headings = grown(self.headings, capacity)
+        self.parents = grown(self.parents, capacity)
+        self.costs = grown(self.costs, capacity)
+        self.words = grown(self.words, capacity)
+        self.lengths = grown(self.lengths, capacity)
+        self.first_child = grown(self.first_child, capacity)
+        self.next_sibling = grown(self.next_sibling, capacity)
+        self.previous_sibling = grown(self.previous_sibling, capacity)
+        self.next_in_bucket = grown(self.next_in_bucket, capacity)
 
     @cython.cfunc
     @cython.nogil
@@ -206,11 +208,3 @@ class SearchTree:
             if node == root:
                 return
             node = self.next_sibling[node]
-
-
-def _grown(view, capacity):
-    """A copy of an array with room for `capacity` rows."""
-    array = np.asarray(view)
-    grown = np.empty((capacity, *array.shape[1:]), array.dtype)
-    grown[:len(array)] = array
-    return grown

@@ -1,0 +1,87 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
+"""A lattice of positions and headings that remembers a cost for each of its cells.
+
+It is a hash table with linear probing, so that it takes no more time and memory than the cells need that were asked for.
+"""
+
+from math import tau
+
+import cython
+import numpy as np
+
+if cython.compiled:
+    from cython.cimports.libc.math import floor
+else:
+    from math import floor
+
+#: The cell of a free entry.
+NO_CELL = cython.declare(cython.longlong, -1)
+#: The cost of a cell that was given none.
+UNSEEN = cython.declare(cython.float, 0)
+#: How many entries there are at first is two to the power of this; never are more than half of them in use.
+FIRST_BITS = 10
+#: 2^64 by the golden ratio, which spreads neighbouring cells (D. Knuth, The art of computer programming, volume 3, 6.4).
+SPREAD = cython.declare(cython.ulonglong, 0x9E3779B97F4A7C15)
+BITS_OF_WORD = cython.declare(cython.ulonglong, 0xFFFFFFFFFFFFFFFF)
+
+
+@cython.cclass
+class Lattice:
+    """The cells that were asked for, each with an entry of the table; `costs` has their costs by entry."""
+
+    def __init__(self, corner, extent, side, sectors):
+        """
+        Args:
+            corner, extent: lowest (x, y) of the map, and its size [m].
+            side: of a cell [m]; sectors: how many headings are told apart.
+        """
+        self.x0, self.y0 = corner
+        self.side, self.sectors, self.circles_per_radian = side, sectors, 1 / tau
+        self.columns, self.rows = int(extent[0] / side) + 1, int(extent[1] / side) + 1
+        self.clear(FIRST_BITS)
+
+    def clear(self, bits):
+        """Forget all cells, and have two to the power of `bits` entries."""
+        self.used, self.bits = 0, bits
+        self.cells, self.costs = np.full(1 << bits, -1, np.int64), np.empty(1 << bits, np.float32)
+
+    def reserve(self, more: cython.int):
+        """Make room for `more` cells; the entries are others afterwards."""
+        if 2 * (self.used + more) <= self.cells.shape[0]:
+            return
+        cells, costs = np.asarray(self.cells), np.asarray(self.costs)
+        taken = cells >= 0
+        self.clear(int(2 * (self.used + more) - 1).bit_length())
+        self.put(cells[taken], costs[taken])
+
+    def put(self, cells: cython.longlong[::1], costs: cython.float[::1]):
+        """Enter cells with their costs."""
+        i: cython.Py_ssize_t
+        for i in range(cells.shape[0]):
+            self.costs[self.entry_of(cells[i])] = costs[i]
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def entry_at(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.int:
+        """The entry of the cell that holds a pose of the map; if it has none yet, there must be room for it."""
+        column: cython.longlong = min(cython.cast(cython.longlong, max(x - self.x0, 0.0) / self.side), self.columns - 1)
+        row: cython.longlong = min(cython.cast(cython.longlong, max(y - self.y0, 0.0) / self.side), self.rows - 1)
+        circles: cython.double = theta * self.circles_per_radian
+        sector: cython.int = min(cython.cast(cython.int, (circles - floor(circles)) * self.sectors), self.sectors - 1)
+        return self.entry_of((row * self.columns + column) * self.sectors + sector)
+
+    @cython.cfunc
+    @cython.nogil
+    @cython.exceptval(check=False)
+    def entry_of(self, cell: cython.longlong) -> cython.int:
+        """The entry of a cell by its number."""
+        number: cython.ulonglong = cython.cast(cython.ulonglong, cell)
+        entry: cython.int = cython.cast(cython.int, (number * SPREAD & BITS_OF_WORD) >> (64 - self.bits))
+        while self.cells[entry] != cell:
+            if self.cells[entry] == NO_CELL:
+                self.cells[entry], self.costs[entry] = cell, UNSEEN
+                self.used += 1
+                break
+            entry = (entry + 1) & ((1 << self.bits) - 1)
+        return entry
