@@ -15,11 +15,11 @@ from .settings import Settings
 
 #: The runs up to the first path: the length of their arcs in turning radii, and the headings of their lattice; the weight of
 #: the cost-to-go is FIRST_WEIGHT. The finer ones are for what the coarser ones do not get through.
-FIRST_RUNS = ((0.6, 16), (0.3, 24), (0.15, 32))
-FIRST_WEIGHT = 1.5
+FIRST_RUNS = ((0.5, 16), (0.3, 24), (0.15, 32))
+FIRST_WEIGHT = 2.0
 #: The next runs come closer and closer to the shortest path: the length of their arcs, the headings of their lattice, the weight.
 #: Later ones have arcs of random length, so that their lattices differ, and weigh the cost-to-go as it is.
-NEXT_RUNS = ((0.4, 16, 1.2), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
+NEXT_RUNS = ((0.4, 16, 1.1), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
 LATER_ARCS = 0.25, 0.6
 #: After so many later runs in a row that found nothing better there are no more.
 MOST_IN_VAIN = 12

@@ -89,6 +89,12 @@ def node_above(tree):
     return parent, leaf
 
 
+def with_another_word(tree):
+    """The turns of an edge that has one, to the other side."""
+    node = int(np.argmax(tree.lengths[:, 0] > 0.01))
+    return corrupted(tree, "words", node, (tree.words[node] + 1) % 2)
+
+
 CORRUPTIONS = {
     "root with a parent": ("no root", lambda t: corrupted(t, "parents", 0, 1)),
     "root with a cost": ("no root", lambda t: corrupted(t, "costs", 0, 1e-9)),
@@ -103,7 +109,7 @@ CORRUPTIONS = {
     "heading by 1e-7 rad": ("edge to node", lambda t: corrupted(t, "poses", (3, 2), t.poses[3, 2] + 1e-7)),
     "pose not a number": ("edge to node", lambda t: corrupted(t, "poses", (3, 0), math.nan)),
     "heading not a number": ("edge to node", lambda t: corrupted(t, "poses", (3, 2), math.nan)),
-    "another word": ("edge to node", lambda t: corrupted(t, "words", 3, (t.words[3] + 1) % 2)),
+    "another word": ("edge to node", with_another_word),
     "another radius": ("edge to node", lambda t: replace(t, radius=1.01 * t.radius)),
     "no nodes": ("no root", lambda t: Tree(1.0, *(a[:0] for a in (t.poses, t.parents, t.costs, t.words, t.lengths)))),
 }
