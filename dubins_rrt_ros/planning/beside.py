@@ -24,7 +24,11 @@ class Beside:
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="dubins_rrt_beside") if cores() > 1 else None
 
     def start(self, function: Callable[..., Answer], *arguments: Any) -> Callable[[], Answer]:
-        """Begin to compute `function(*arguments)`; what is returned waits for its answer."""
-        if self._pool:
-            return self._pool.submit(function, *arguments).result
-        return cache(lambda: function(*arguments))
+        """Compute `function(*arguments)` when what was begun before is done; what is returned gives its answer.
+
+        Where that is asked for before the computation has begun, the caller does it at once.
+        """
+        if not self._pool:
+            return cache(lambda: function(*arguments))
+        future = self._pool.submit(function, *arguments)
+        return cache(lambda: function(*arguments) if future.cancel() else future.result())

@@ -261,8 +261,8 @@ class Search:
     def _aim_below_best(self) -> None:
         """Draw and add only what can be on a path shorter than the best, and forget the nodes that cannot."""
         if self._from_start is None:
+            self._from_start = self._bound_from_start()  # first, as it was begun last and may not have been begun yet
             self.make_bound()
-            self._from_start = self._bound_from_start()
         limit = self.length
         self._grower.beat(limit, self._from_start.kernel, self._to_goal.kernel)
         if limit < self._forgot_above * (1 - LEAST_FALL):
