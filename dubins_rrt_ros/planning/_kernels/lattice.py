@@ -22,6 +22,8 @@ UNSEEN = cython.declare(cython.float, 0)
 FIRST_BITS = 10
 #: 2^64 by the golden ratio, which spreads neighbouring cells (D. Knuth, The art of computer programming, volume 3, 6.4).
 SPREAD = cython.declare(cython.ulonglong, 0x9E3779B97F4A7C15)
+#: The bits of a cell's number that tell it apart: where there are more cells than 2^63, some share an entry.
+TOLD_APART = cython.declare(cython.ulonglong, 0x7FFFFFFFFFFFFFFF)
 BITS_OF_WORD = cython.declare(cython.ulonglong, 0xFFFFFFFFFFFFFFFF)
 
 
@@ -69,7 +71,9 @@ class Lattice:
         row: cython.longlong = min(cython.cast(cython.longlong, max(y - self.y0, 0.0) / self.side), self.rows - 1)
         circles: cython.double = theta * self.circles_per_radian
         sector: cython.int = min(cython.cast(cython.int, (circles - floor(circles)) * self.sectors), self.sectors - 1)
-        return self.entry_of((row * self.columns + column) * self.sectors + sector)
+        columns: cython.ulonglong = self.columns
+        place: cython.ulonglong = row * columns + column
+        return self.entry_of(cython.cast(cython.longlong, (place * self.sectors + sector) & TOLD_APART))
 
     @cython.cfunc
     @cython.nogil
