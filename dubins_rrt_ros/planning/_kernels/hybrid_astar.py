@@ -3,7 +3,8 @@
 
 D. Dolgov, S. Thrun, M. Montemerlo and J. Diebel, Practical search techniques in path planning for autonomous driving (2008).
 The next pose is the one whose cost and weighted cost-to-go together are least; the cost-to-go is the longer one of the way around
-the obstacles and of the Dubins curve without them. From each pose the Dubins curve to the goal is tried.
+the obstacles and of the Dubins curve without them. From each pose the Dubins curve to the goal is tried, unless it is so much
+shorter than the way around the obstacles that it must hit one.
 """
 
 import cython
@@ -29,6 +30,9 @@ else:
 
 #: What the lattice has as the cost of a cell whose pose was expanded.
 EXPANDED = cython.declare(cython.float, -1)
+#: A curve to the goal that is shorter than this share of the way around the obstacles is not tried; that can come out too long by
+#: some hundredths.
+LEAST_SHARE = cython.declare(cython.double, 0.95)
 #: An expansion reaches so many poses at most.
 TURNS = cython.declare(cython.int, 3)
 
@@ -59,6 +63,7 @@ class HybridAStar:
     costs: cython.double[::1]
     parents: cython.int[::1]
     turns: cython.schar[::1]
+    curve_may_be_free: cython.schar[::1]
     lattice: Lattice
     open: Heap
     last: cython.int
@@ -85,14 +90,14 @@ class HybridAStar:
         self.arc, self.weight, self.limit, self.most = arc, weight, limit, most
         self.lattice = Lattice(corner, extent, 0.7 * arc, sectors)
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
-        self.parents, self.turns = np.empty(0, np.int32), np.empty(0, np.int8)
+        self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
         self.open = Heap(0)
         self.last_lengths = np.zeros(3)
         self.last = -1
         self.size = self.expanded = 0
         self.ended = False
         self.reserve(1)
-        self.add(start[0], start[1], start[2], 0, -1, 0, 0)
+        self.add(start[0], start[1], start[2], 0, -1, 0, 0, True)
 
     def run(self, expansions: cython.int):
         """Expand up to so many poses more, fewer where the search ends."""
@@ -114,6 +119,7 @@ class HybridAStar:
             capacity = self.size + max(more, self.size)
             self.poses, self.costs = grown(self.poses, capacity), grown(self.costs, capacity)
             self.parents, self.turns = grown(self.parents, capacity), grown(self.turns, capacity)
+            self.curve_may_be_free = grown(self.curve_may_be_free, capacity)
 
     def path(self):
         """The path that was found: (n, 3) poses from the start on, and (n,) words and (n, 3) lengths [m] of the curves to them
@@ -143,7 +149,7 @@ class HybridAStar:
             return
         self.lattice.costs[entry] = EXPANDED
         self.expanded += 1
-        if self.reaches_goal(node):
+        if self.curve_may_be_free[node] and self.reaches_goal(node):
             self.last = node
             return
         sine: cython.double = sin(self.poses[node, 2])
@@ -194,29 +200,33 @@ class HybridAStar:
         seen: cython.float = self.lattice.costs[entry]
         if seen != UNSEEN and seen <= cost * (1 + 1e-6):
             return
-        more: cython.double = self.cost_to_go(x, y, theta, self.limit - cost)
+        more: cython.double
+        curve_may_be_free: cython.bint
+        more, curve_may_be_free = self.cost_to_go(x, y, theta, self.limit - cost)
         if cost + more >= self.limit:
             return
         if not self.body.curve_is_free(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2], self.radius,
                                        1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0):
             return
         self.lattice.costs[entry] = cython.cast(cython.float, cost)
-        self.add(x, y, theta, cost, node, turn, cost + self.weight * more)
+        self.add(x, y, theta, cost, node, turn, cost + self.weight * more, curve_may_be_free)
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def cost_to_go(self, x: cython.double, y: cython.double, theta: cython.double, limit: cython.double) -> cython.double:
-        """A length that no path to the goal falls below, if less than `limit`."""
+    def cost_to_go(self, x: cython.double, y: cython.double, theta: cython.double, limit: cython.double
+                   ) -> tuple[cython.double, cython.bint]:
+        """A length that no path to the goal falls below, if less than `limit`; and whether the curve to the goal may be free."""
         around: cython.double = self.to_goal.at(x, y)
         if around >= limit or self.goals.shape[0] > 1:
-            return around
+            return around, True
         word: cython.int
         first: cython.double
         second: cython.double
         third: cython.double
         word, first, second, third = self.curve_to_goal(x, y, theta, 0, limit)
-        return max(around, first + second + third)
+        length: cython.double = first + second + third
+        return max(around, length), length >= LEAST_SHARE * around
 
     @cython.cfunc
     @cython.nogil
@@ -232,10 +242,11 @@ class HybridAStar:
     @cython.nogil
     @cython.exceptval(check=False)
     def add(self, x: cython.double, y: cython.double, theta: cython.double, cost: cython.double, parent: cython.int,
-            turn: cython.int, key: cython.double) -> cython.void:
+            turn: cython.int, key: cython.double, curve_may_be_free: cython.bint) -> cython.void:
         """Note a pose that was reached, to be expanded."""
         node: cython.int = self.size
         self.size += 1
         self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = x, y, theta
         self.costs[node], self.parents[node], self.turns[node] = cost, parent, turn
+        self.curve_may_be_free[node] = curve_may_be_free
         self.open.push(node, key)
