@@ -53,7 +53,7 @@ BLOCK = 512
 #: About how long a batch takes [s]: so long does a cancellation wait.
 BATCH_TIME = 0.005
 #: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
-EXPANSIONS, MOST_FIRST, MOST_SECOND = (128, 32_768, 4096) if COMPILED else (32, 512, 128)
+EXPANSIONS, MOST_FIRST, MOST_SECOND = (256, 32_768, 4096) if COMPILED else (32, 512, 128)
 #: After a block the search waits for so many poses at most that it expanded beside it: for a disc, and for a polygon, which takes
 #: several times as long.
 EXPANSIONS_BESIDE, EXPANSIONS_BESIDE_OF_POLYGON = 1024, 128
