@@ -22,7 +22,7 @@ from .progress import with_bar
 DEFAULT_TIME = 5.0
 _HIGHEST = {item.name: item.high for item in options(Settings)}
 #: The arguments that a report takes, and those of every call; all others are for measuring.
-_OF_REPORT, _OF_ALL = {"report", "best_known", "plot"}, {"command", "run", "out", "json"}
+_OF_REPORT, _OF_ALL = {"report", "best_known", "plot", "plot_samples"}, {"command", "run", "out", "json"}
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,8 @@ def _add_report(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--best-known", metavar="FILE",
                        help="the shortest known lengths, {problem: m}; by default the best of the runs")
     group.add_argument("--plot", metavar="FILE", help="draw cost over time; .png, .svg or .pdf")
+    group.add_argument("--plot-samples", metavar="FILE",
+                       help="draw what a sample costs over the size of the tree, a point for each label; .png, .svg or .pdf")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -92,9 +94,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check_outputs(given: dict[str, Any]) -> None:
     """Refuse files that cannot be written, or that would be written over before they are read."""
-    out, plot = given.get("out"), given.get("plot")
-    check_folder(out, plot, given["json"])
-    check_drawing(plot)
+    out, plots = given.get("out"), [given.get("plot"), given.get("plot_samples")]
+    check_folder(out, *plots, given["json"])
+    for plot in plots:
+        check_drawing(plot)
     sources = given.get("report", [given["file"]] if "file" in given else [])
     if out and Path(out).resolve() in [Path(source).resolve() for source in sources]:
         raise UsageError(f"--out {out} would overwrite what is read; name another file")
@@ -147,15 +150,18 @@ def _count(arguments: argparse.Namespace, name: str) -> int:
 def _report(given: dict[str, Any]) -> int:
     runs = read_runs(given["report"])
     best = best_known(runs, read_best_known(given["best_known"]) if "best_known" in given else {})
+    if "plot" in given:
+        from .bench_plots import draw_runs  # here, for matplotlib takes long to import
+        draw_runs(given["plot"], runs, best)
+    if "plot_samples" in given:
+        from .bench_plots import draw_sample_costs
+        draw_sample_costs(given["plot_samples"], runs)
     _write_json(given["json"], runs, best)
     text = to_markdown(runs, best)
     if given.get("out", STDOUT) == STDOUT:
         print(text, end="", file=words_for(given["json"]))
     else:
         Path(given["out"]).write_text(text, encoding="utf-8")
-    if "plot" in given:
-        from .bench_plots import draw_runs  # here, for matplotlib takes long to import
-        draw_runs(given["plot"], runs, best)
     return 0
 
 

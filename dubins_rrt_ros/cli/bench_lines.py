@@ -19,6 +19,7 @@ class Run(NamedTuple):
         trace: (seconds, cost [m]) of each improvement, the costs falling with time; none of a run that is not solved.
         end: until when it is known what the run has [s]: it was cut short then, if it did not end by itself.
         total: how long it took, at most the time it was given [s].
+        samples, nodes: how many samples were drawn, and how many nodes the tree has; 0 where the line does not tell.
     """
 
     problem: str
@@ -28,6 +29,8 @@ class Run(NamedTuple):
     trace: tuple[tuple[float, float], ...]
     end: float
     total: float
+    samples: int
+    nodes: int
 
     @property
     def first(self) -> tuple[float, float]:
@@ -63,7 +66,8 @@ Runs = Mapping[str, Mapping[str, list[Run]]]
 def run_of(line: Mapping[str, Any]) -> Run:
     """The run that a line of `dubins_rrt bench` tells of, or of a program that writes the same.
 
-    Its check is the field `audit`, which is "ok", or `verify.step_ok`; without either `solved` is believed.
+    Its check is the field `audit`, which is "ok", or `verify.step_ok`; without either `solved` is believed. `samples` and
+    `vertices` need not be there.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: the line has not the fields it must have.
@@ -78,7 +82,8 @@ def run_of(line: Mapping[str, Any]) -> Run:
     trace = _improvements(line["trace"]) if solved else ()
     if solved and not trace:
         raise ValueError("it is solved, but its trace is empty")
-    return Run(str(line["problem"]), str(line["planner"]), int(line["seed"]), solved, trace, max(limit, total), min(limit, total))
+    return Run(str(line["problem"]), str(line["planner"]), int(line["seed"]), solved, trace, max(limit, total), min(limit, total),
+               int(line.get("samples") or 0), int(line.get("vertices") or 0))
 
 
 def _improvements(trace: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

@@ -1,8 +1,8 @@
-"""Pictures of runs: how near to the best known length planners come, over time."""
+"""Pictures of runs: how near to the best known length planners come over time, and what a sample costs as the tree grows."""
 
 import math
 from collections.abc import Collection, Mapping
-from itertools import product
+from itertools import cycle, product
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from .bench_lines import Best, Run, Runs
 from .bench_report import quantile, ratio
+from .flags import UsageError
 from .plots import CULPRIT, DPI, GOAL, PATH, START
 
 #: Colours of Okabe and Ito's palette, without the yellow, too pale for lines; after the last follows the next kind of line.
@@ -38,6 +39,41 @@ def draw_runs(file: str, runs: Runs, best: Mapping[str, Best]) -> None:
     samples = [Line2D([], [], color=colour, linestyle=line, linewidth=2.5) for colour, line in style_of.values()]
     figure.legend(samples, list(names), loc="outside upper center", ncols=_columns(panels), fontsize=12, frameon=False)
     figure.savefig(file, dpi=DPI)
+
+
+def draw_sample_costs(file: str, runs: Runs) -> None:
+    """Draw what a sample cost over the size of the tree, and how that would grow from its lowest point on if it grew as the
+    logarithm: lines for each problem, with a point for each planner, meant to be the same one with one budget and another.
+
+    Raises:
+        UsageError: no run tells how many samples were drawn and how many nodes the tree has.
+    """
+    figure = Figure(figsize=(2 * WIDTH, 1.7 * HEIGHT), layout="constrained")
+    axes = figure.subplots()
+    axes.set(xscale="log", xlabel="nodes of the tree", ylabel="time for each sample [µs]")
+    axes.grid(color="#dddddd", linewidth=0.6)
+    for (problem, planners), colour in zip(runs.items(), cycle(COLOURS), strict=False):
+        told = [group for group in planners.values() if all(run.samples and run.nodes for run in group)]
+        if told:
+            _draw_costs(axes, problem, *np.array(sorted(map(sample_cost, told))).T, colour)
+    if not axes.lines:
+        raise UsageError("--plot-samples: no run tells its samples and vertices; give files that `dubins_rrt bench --out` wrote")
+    axes.plot([], [], "--", color="#777777", label="logarithm of the tree")
+    axes.set_ylim(0)
+    axes.legend(frameon=False)
+    figure.savefig(file, dpi=DPI)
+
+
+def sample_cost(group: list[Run]) -> tuple[float, float]:
+    """The medians of the nodes of a planner's runs, and of their times for each sample [µs]."""
+    return quantile([run.nodes for run in group], 0.5), quantile([1e6 * run.total / run.samples for run in group], 0.5)
+
+
+def _draw_costs(axes: Axes, problem: str, nodes: np.ndarray, costs: np.ndarray, colour: str) -> None:
+    lowest = np.argmin(costs)
+    onward = np.geomspace(nodes[lowest], nodes[-1], INSTANTS)
+    axes.plot(nodes, costs, "o-", color=colour, linewidth=1.8, label=problem)
+    axes.plot(onward, costs[lowest] * np.log1p(onward) / np.log1p(onward[0]), "--", color=colour, linewidth=1)
 
 
 def _columns(panels: Collection[str]) -> int:

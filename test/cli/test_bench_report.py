@@ -9,6 +9,8 @@ import pytest
 from matplotlib.image import imread
 
 from dubins_rrt_ros.cli import bench_report
+from dubins_rrt_ros.cli.bench_lines import run_of
+from dubins_rrt_ros.cli.bench_plots import sample_cost
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.cli.plots import GOAL, PATH
 
@@ -184,5 +186,23 @@ def test_the_plot_takes_runs_of_any_kind():
     assert imread("runs.png").size > 0
 
 
-def test_a_picture_in_another_format_is_refused(capsys):
-    assert "p.gif" in refusal(write(RUNS), "--plot", "p.gif", capsys=capsys)
+def test_what_asample_costs_is_drawn_for_each_budget():
+    """Medians of 20 and 30 µs at 200 and 2000 nodes; seed 2 is slower, and runs that do not tell are left out."""
+    runs = [run("yard", label, seed, (0.1, 10), total_s=total, samples=samples, vertices=samples // 5)
+            for label, samples, total in (("few", 1000, 0.02), ("many", 10_000, 0.3)) for seed, total in enumerate(
+                (total, total, 2 * total))]
+    assert sample_cost([run_of(line) for line in runs[:3]]) == (200, pytest.approx(20))
+    assert sample_cost([run_of(line) for line in runs[3:]]) == (2000, pytest.approx(30))
+    report(write([*runs, *RUNS[4:]]), "--plot-samples", "samples.svg")
+    text = Path("samples.svg").read_text()
+    assert "<!-- yard -->" in text and "<!-- pond -->" not in text
+
+
+def test_runs_that_tell_no_samples_are_not_drawn_in_vain(capsys):
+    assert "tells its samples" in refusal(write(RUNS), "--plot-samples", "samples.svg", "--out", "report.md", capsys=capsys)
+    assert not Path("samples.svg").exists()
+
+
+@pytest.mark.parametrize("flag", ["--plot", "--plot-samples"])
+def test_a_picture_in_another_format_is_refused(flag, capsys):
+    assert "p.gif" in refusal(write(RUNS), flag, "p.gif", capsys=capsys)

@@ -78,7 +78,7 @@ def test_bash_completes_map_names_and_files_where_a_map_is_due(words, bash):
     (["plan", "maze", "--start", ""], set()), (["plan", "maze", "--start", "1", "2", ""], set()),
     (["plan", "maze", "--seed", ""], set()), (["completion", ""], {"bash", "zsh", "fish"}),
     (["render", "maze.geojson", "--out", ""], {"grids"}), (["nothing", ""], set()),
-    (["bench", "--report", "a", "b", "--plo"], {"--plot"}),
+    (["bench", "--report", "a", "b", "--plo"], {"--plot", "--plot-samples"}),
     (["plan", "maze", "--goal-t"], {"--goal-tolerance-xy", "--goal-tolerance-yaw"})])
 def test_bash_completes_what_a_place_takes(words, replies, bash):
     assert bash(*words) == replies
