@@ -35,13 +35,13 @@ def first_path(problem, portion=256):
     return None, runs
 
 
-def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000):
+def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000, crowding=0.0):
     """One run."""
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
     return HybridAStar(field.body(problem.vehicle), radius, problem.start, np.array([problem.goal]),
                        DistanceField.to_goal(problem, field).kernel, corners.min(axis=0), np.ptp(corners, axis=0),
-                       arc * radius, sectors, weight, limit, most)
+                       arc * radius, sectors, weight, crowding, limit, most)
 
 
 def finished(search, portion=1000):
@@ -178,6 +178,20 @@ def test_an_unreachable_goal_ends_the_runs():
     chain, runs = first_path(closed, portion=500)
     assert chain is None
     assert runs.exhausted
+
+
+def test_a_passage_that_the_vehicle_cannot_turn_into_is_given_up_sooner_where_crowds_count():
+    """A slot of two walls whose gaps are apart: the shortest way for the disc, while the vehicle has to drive around."""
+    data = np.zeros((200, 200))
+    data[:160, 100], data[:160, 110] = 100, 100
+    data[80:90, 100] = data[120:130, 110] = 0
+    problem = Problem(GridMap(data, 0.1), Vehicle(2.0, 0.2), (3.0, 8.5, 0.0), (17.0, 8.5, 0.0))
+    expanded = []
+    for crowding in (0.0, 1.0):
+        search = search_on(problem, arc=0.5, weight=2.0, crowding=crowding)
+        check(finished(search), problem)
+        expanded.append(search.expanded)
+    assert expanded[1] < 0.7 * expanded[0]
 
 
 def test_a_run_gives_up_after_so_many_poses():

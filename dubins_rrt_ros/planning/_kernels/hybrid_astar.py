@@ -5,6 +5,9 @@ D. Dolgov, S. Thrun, M. Montemerlo and J. Diebel, Practical search techniques in
 The next pose is the one whose cost and weighted cost-to-go together are least; the cost-to-go is the longer one of the way around
 the obstacles and of the Dubins curve without them. From each pose the Dubins curve to the goal is tried, unless it is so much
 shorter than the way around the obstacles that it must hit one.
+
+The cost-to-go can lead into a passage that the vehicle cannot turn into. Before another way is tried, all poses in front of it
+would be expanded, with every heading. So a pose may count for more the more of them were expanded around it.
 """
 
 import cython
@@ -54,6 +57,7 @@ class HybridAStar:
     rounding: cython.double
     arc: cython.double
     weight: cython.double
+    crowding: cython.double
     limit: cython.double
     most: cython.int
     size = cython.declare(cython.int, visibility="readonly")
@@ -65,13 +69,15 @@ class HybridAStar:
     turns: cython.schar[::1]
     curve_may_be_free: cython.schar[::1]
     lattice: Lattice
+    expanded_around: Lattice
     open: Heap
     last: cython.int
     last_goal: cython.int
     last_word: cython.int
     last_lengths: cython.double[::1]
 
-    def __init__(self, body: Body, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight, limit, most):
+    def __init__(self, body: Body, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight, crowding,
+                 limit, most):
         """
         Args:
             body: what must be free along all arcs.
@@ -80,6 +86,7 @@ class HybridAStar:
             corner, extent: lowest (x, y) of the map, and its size [m].
             arc: the length of an arc [m]; the lattice has cells of about 0.7 of that, and `sectors` headings.
             weight: of the cost-to-go: 1 seeks the shortest path, more a quick one.
+            crowding: by how many arcs' lengths a pose counts for more for each that was expanded in its block of four cells.
             limit: paths that are not shorter are not sought [m].
             most: no more poses are expanded.
         """
@@ -87,8 +94,8 @@ class HybridAStar:
         self.to_goal, self.goals = to_goal, goals
         self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
-        self.arc, self.weight, self.limit, self.most = arc, weight, limit, most
-        self.lattice = Lattice(corner, extent, 0.7 * arc, sectors)
+        self.arc, self.weight, self.crowding, self.limit, self.most = arc, weight, crowding, limit, most
+        self.lattice, self.expanded_around = Lattice(corner, extent, 0.7 * arc, sectors), Lattice(corner, extent, 1.4 * arc, 1)
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
         self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
         self.open = Heap(0)
@@ -114,6 +121,8 @@ class HybridAStar:
     def reserve(self, more: cython.int):
         """Make room for `more` poses, so that adding them allocates nothing."""
         self.lattice.reserve(more)
+        if self.crowding > 0:
+            self.expanded_around.reserve(more)
         self.open.reserve(more)
         if self.size + more > self.parents.shape[0]:
             capacity = self.size + max(more, self.size)
@@ -149,6 +158,8 @@ class HybridAStar:
             return
         self.lattice.costs[entry] = EXPANDED
         self.expanded += 1
+        if self.crowding > 0:
+            self.expanded_around.costs[self.expanded_around.entry_at(self.poses[node, 0], self.poses[node, 1], 0)] += 1
         if self.curve_may_be_free[node] and self.reaches_goal(node):
             self.last = node
             return
@@ -209,7 +220,10 @@ class HybridAStar:
                                        1 if turn < 0 else 0, self.arc if turn != 0 else 0, self.arc if turn == 0 else 0, 0):
             return
         self.lattice.costs[entry] = cython.cast(cython.float, cost)
-        self.add(x, y, theta, cost, node, turn, cost + self.weight * more, curve_may_be_free)
+        key: cython.double = cost + self.weight * more
+        if self.crowding > 0:
+            key += self.crowding * self.arc * self.expanded_around.costs[self.expanded_around.entry_at(x, y, 0)]
+        self.add(x, y, theta, cost, node, turn, key, curve_may_be_free)
 
     @cython.cfunc
     @cython.nogil
