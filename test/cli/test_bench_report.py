@@ -186,7 +186,7 @@ def test_the_plot_takes_runs_of_any_kind():
     assert imread("runs.png").size > 0
 
 
-def test_what_asample_costs_is_drawn_for_each_budget():
+def test_what_a_sample_costs_is_drawn_for_each_budget():
     """Medians of 20 and 30 µs at 200 and 2000 nodes; seed 2 is slower, and runs that do not tell are left out."""
     runs = [run("yard", label, seed, (0.1, 10), total_s=total, samples=samples, vertices=samples // 5)
             for label, samples, total in (("few", 1000, 0.02), ("many", 10_000, 0.3)) for seed, total in enumerate(
