@@ -52,9 +52,9 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: M
 def _keep_freed_memory() -> None:
     """Have glibc keep what a request frees for the next one, up to 32 MB.
 
-    By itself it gives most of it back, and fetching that again, page by page, can take as long as the way to a first path. It
-    keeps twice the largest block that it saw freed; this one costs nothing, as it is not touched. Other C libraries, and limits
-    that were set with mallopt(), are left as they are.
+    By itself it gives much of it back, and fetching that again, page by page, takes up to a quarter of the time to a first path.
+    It keeps twice the largest block that it saw freed; this one costs nothing, as it is not touched. Other C libraries, and
+    limits that were set with mallopt(), as the node does, are left as they are.
     """
     np.empty(LARGE_BLOCK, np.uint8)
 

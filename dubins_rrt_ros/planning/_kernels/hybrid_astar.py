@@ -95,7 +95,8 @@ class HybridAStar:
         self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
         self.arc, self.weight, self.crowding, self.limit, self.most = arc, weight, crowding, limit, most
-        self.lattice, self.expanded_around = Lattice(corner, extent, 0.7 * arc, sectors), Lattice(corner, extent, 1.4 * arc, 1)
+        self.lattice = Lattice(corner, extent, 0.7 * arc, sectors)
+        self.expanded_around = Lattice(corner, extent, 1.4 * arc, 1)  # whose costs are counts
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
         self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
         self.open = Heap(0)
