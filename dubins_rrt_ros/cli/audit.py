@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dubins_rrt_ros import __version__
-from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Problem, Vehicle, audit, values
-from dubins_rrt_ros.planning.audit_poses import audit_poses, driven_length
+from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Problem, Vehicle, audit_path, values
+from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
-from dubins_rrt_ros.planning.wording import quoted
+from dubins_rrt_ros.planning.text import quoted
 
-from .bench_problems import read_json
-from .flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
-from .output import check_folder, finite, words_for, write_document
-from .request import MAX_MAP_CELLS, read_map
+from .bench.problems import read_json
+from .common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .common.output import check_folder, finite, words_for, write_document
+from .common.request import MAX_MAP_CELLS, read_map
 
 #: How far poses may be off by default [m, rad]: ample for four digits behind the point.
 TOLERANCE_XY, TOLERANCE_YAW = 1e-3, 1e-3
@@ -107,7 +107,7 @@ def _judge_plan(document: Mapping[str, Any], map: Map, arguments: argparse.Names
     replaced = {name: value for flag in given for name, value in _REPLACES.get(flag, {}).items()}
     problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments),
                       **given_options(arguments, Problem))
-    return Verdict(problem, path.length, audit(path, problem))
+    return Verdict(problem, path.length, audit_path(path, problem))
 
 
 def _judge_poses(document: Any, map: Map, arguments: argparse.Namespace) -> Verdict:

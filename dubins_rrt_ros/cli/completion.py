@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
-from .flags import add_command
+from .common.flags import add_command
 
 #: What is completed where the help asks for these.
 _KINDS = {"MAP": "@map", "DIR": "@folder", "FILE": "@file", "PATH.json": "@file", "PROBLEMS.json": "@file"}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dubins_rrt_ros import __version__
 
 if TYPE_CHECKING:
-    from .flags import Parser
+    from .common.flags import Parser
 
 SUCCESS, NO_PATH, WRONG_USAGE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 
@@ -52,7 +52,7 @@ def _run(words: Sequence[str]) -> int:
     from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
     from dubins_rrt_ros.planning.plan_file import PlanFileError
 
-    from .flags import UsageError, guard_numbers
+    from .common.flags import UsageError, guard_numbers
     parser = _parser()
     if not words:
         parser.print_help(sys.stderr)
@@ -68,8 +68,14 @@ def _run(words: Sequence[str]) -> int:
 
 
 def _parser() -> "Parser":
-    from . import audit, bench, campaign, completion, demo, figures, paper, plan, render
-    from .flags import Parser, section
+    from dubins_rrt_ros.evaluation.campaign import command as campaign
+    from dubins_rrt_ros.evaluation.figures import command as figures
+    from dubins_rrt_ros.evaluation.paper import command as paper
+
+    from . import audit, completion, plan, render
+    from .bench import command as bench
+    from .common.flags import Parser, section
+    from .demo import command as demo
     start = section("quick start", *plan.EXAMPLES[:1], "dubins_rrt plan --help")
     status = section("exit status", "0 done, 1 no path or a wrong one, 2 wrong usage, 130 interrupted")
     parser = Parser(prog="dubins_rrt", epilog=f"{start}\n\n{status}",

@@ -13,9 +13,9 @@ from tqdm import tqdm
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
 
-from .flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
-from .output import check_drawing, check_folder, words_for, write_csv, write_json
-from .request import MAX_MAP_CELLS, Request, read_map, read_replay
+from .common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
+from .common.request import MAX_MAP_CELLS, Request, read_map, read_replay
 
 EXAMPLES = ("dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --plot maze.png",
             "dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --planner rrt --json plan.json",
@@ -127,7 +127,7 @@ def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:
     if arguments.csv:
         write_csv(arguments.csv, answer)
     if arguments.plot:
-        from .plots import draw_plan  # here, for matplotlib takes longer to import than most plans to make
+        from .common.plots import draw_plan  # here, for matplotlib takes longer to import than most plans to make
         draw_plan(arguments.plot, answer)
 
 

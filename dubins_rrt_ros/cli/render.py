@@ -6,9 +6,9 @@ from pathlib import Path
 
 from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
 
-from .flags import UsageError, add_command, add_json_flag
-from .output import check_folder, words_for, write_document
-from .request import find_map
+from .common.flags import UsageError, add_command, add_json_flag
+from .common.output import check_folder, words_for, write_document
+from .common.request import find_map
 
 #: Each cell is a polygon while it is judged, a few hundred bytes.
 MAX_CELLS = 4_000_000

@@ -15,8 +15,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from dubins_rrt_ros.planning import GridMap, Map, MapError, MapMetadataError, MapNotFound, Vehicle, load_map, prepare
-from dubins_rrt_ros.planning.footprint import summary
-from dubins_rrt_ros.share import find_map
+from dubins_rrt_ros.planning.collision.footprint import summary
+from dubins_rrt_ros.planning.maps.locate import find_map
 
 from .conversions import as_grid, grid_from, grid_message
 from .mailbox import Mailbox

@@ -11,8 +11,8 @@ from typing import Any
 import yaml
 
 from dubins_rrt_ros.planning import options
-from dubins_rrt_ros.planning.plain_yaml import load_plain
-from dubins_rrt_ros.planning.wording import one_line
+from dubins_rrt_ros.planning.maps.yaml import load_plain
+from dubins_rrt_ros.planning.text import one_line
 
 from .parameters import CLASSES, READ_ONLY, read_only
 

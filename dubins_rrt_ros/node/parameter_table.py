@@ -3,7 +3,7 @@
 import json
 import re
 
-from dubins_rrt_ros.planning.options import Option
+from dubins_rrt_ros.planning.option import Option
 
 from .parameters import OPTIONS, READ_ONLY
 

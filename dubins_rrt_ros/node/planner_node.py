@@ -18,7 +18,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from dubins_rrt_ros.planning import Audit, InvalidPose, OptionError, Plan, Pose, Problem, Status, audit, kernels_compiled
+from dubins_rrt_ros.planning import Audit, InvalidPose, OptionError, Plan, Pose, Problem, Status, audit_path, kernels_compiled
 
 from .frames import Frames
 from .mailbox import Mailbox
@@ -245,7 +245,7 @@ class PlannerNode(Node):
                 or not self._maps.is_prepared or not self._configured.read().node.replan_on_map_change):
             return
         problem = replace(shown.problem, map=used.map)
-        self._maps.worker.submit(lambda cancelled: audit(shown.path, problem),
+        self._maps.worker.submit(lambda cancelled: audit_path(shown.path, problem),
                                  lambda outcome: self._mailbox.post(partial(self._on_checked, shown, used, outcome)))
 
     def _on_checked(self, shown: Plan, used: MapInUse, outcome: Audit | Exception) -> None:

@@ -6,15 +6,15 @@ from typing import Any
 
 from dubins_rrt_ros import __version__
 
-from .dubins import WORDS, DubinsCurve
-from .map import Map
-from .options import is_number, options, values
-from .path import Path
+from .curves.dubins import WORDS, DubinsCurve
+from .curves.path import Path
+from .maps.model import Map
+from .option import is_number, options, values
 from .problem import Problem, checked_pose
 from .result import Plan
 from .settings import Settings
+from .text import one_line, quoted
 from .vehicle import Vehicle
-from .wording import one_line, quoted
 
 
 class PlanFileError(ValueError):

@@ -8,20 +8,20 @@ from functools import cache
 
 import numpy as np
 
-from . import reasons
-from .audit import Audit, audit
-from .bounds import lower_bound
-from .clearance import ClearanceField
-from .distance import DistanceField, free_blocks
-from .footprint import cover
-from .headings import FOLLOW_FIELD
-from .map import Map
-from .path import Path
+from .audit.verdict import Audit, audit_path
+from .collision.clearance import ClearanceField
+from .collision.footprint import cover
+from .curves.path import Path
+from .diagnosis import explain
+from .diagnosis.bounds import lower_bound
+from .maps.model import Map
 from .problem import Problem
 from .result import Plan, Progress, Status
-from .rrt import Search
+from .search.cost_to_go import DistanceField, free_blocks
+from .search.headings import FOLLOW_FIELD
+from .search.rrt import Search
+from .search.tree import Tree
 from .settings import Settings
-from .tree import Tree
 from .vehicle import Vehicle
 
 #: Progress is reported at least this often [s].
@@ -115,7 +115,7 @@ class _Request:
         field = self._prepared_field()
         if cancel():
             return self._cancelled(self._root, 0)
-        if reason := reasons.before_search(self._problem, field):
+        if reason := explain.before_search(self._problem, field):
             return self._plan(reason.status, reason.message, self._root, culprit=reason.culprit)
         if self._start_reaches_goal():
             self._time_to_first = self._elapsed
@@ -181,7 +181,7 @@ class _Request:
             status, what, more = Status.NO_VALID_PATH, "No path found", "samples"
         else:
             status, what, more = Status.TIMEOUT, f"No path within planning_time {self._settings.planning_time:g} s", "time"
-        why, culprit = reasons.after_search(self._problem, field, tree, more)
+        why, culprit = explain.after_search(self._problem, field, tree, more)
         if search.samples == 0 and culprit is None:
             why = f"allow more {more}"
         elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
@@ -195,7 +195,7 @@ class _Request:
     def _audited(self, path: Path, tree: Tree, samples: int, *, cancelled: bool = False, running: bool = False) -> Plan:
         """The plan with a path, if the path passes the audit."""
         if self._judged is not path:  # an improvement that was reported is often the answer too
-            self._judged, self._verdict = path, audit(path, self._problem)
+            self._judged, self._verdict = path, audit_path(path, self._problem)
         verdict = self._verdict
         if not verdict.ok:
             message = f"A defect in the planner: its path failed the audit: {'; '.join(verdict.findings)}. Please report it."

@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .map import Map
-from .options import convert_options, option
+from .maps.model import Map
+from .option import convert_options, option
+from .text import quoted
 from .vehicle import Vehicle
-from .wording import quoted
 
 Pose = tuple[float, float, float]
 

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
-from .dubins import ROUNDING
-from .path import JOINT, Path
+from .curves.dubins import ROUNDING
+from .curves.path import JOINT, Path
 from .problem import Problem
+from .search.tree import Tree
 from .settings import Settings
-from .tree import Tree
 
 
 class Status(IntEnum):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from .options import convert_options, option
+from .option import convert_options, option
 
 
 @dataclass(frozen=True)

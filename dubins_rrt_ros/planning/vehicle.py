@@ -9,7 +9,7 @@ from typing import Any
 
 import shapely
 
-from .options import OptionError, convert_options, is_number, option, options
+from .option import OptionError, convert_options, is_number, option, options
 
 #: The most corners of a footprint.
 MAX_CORNERS = 100

@@ -13,7 +13,7 @@ import shapely
 
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.planning import PolygonMap, Problem, Settings, Vehicle, load_map, plan, rasterise, save_map
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 HALL = shapely.box(-6, -5, 6, 5).difference(shapely.box(-1, -5, 0, 1))
 START, GOAL = [-4.0, -3.0, 1.5707963267948966], [3.5, -3.0, -1.5707963267948966]

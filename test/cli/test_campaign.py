@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 from cases import needs_compiled
 
-from dubins_rrt_ros.cli import campaign_judge, campaign_problems
-from dubins_rrt_ros.cli.campaign_judge import Task, judged
-from dubins_rrt_ros.cli.campaign_problems import Trial, random_trial
-from dubins_rrt_ros.cli.campaign_runs import results
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner, reasons
+from dubins_rrt_ros.evaluation.campaign import judge as campaign_judge
+from dubins_rrt_ros.evaluation.campaign import problems as campaign_problems
+from dubins_rrt_ros.evaluation.campaign.judge import Task, judged
+from dubins_rrt_ros.evaluation.campaign.problems import Trial, random_trial
+from dubins_rrt_ros.evaluation.campaign.runs import results
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner
 from dubins_rrt_ros.planning._kernels.body import Body
-from dubins_rrt_ros.planning.reasons import Reason
+from dubins_rrt_ros.planning.diagnosis import explain as reasons
+from dubins_rrt_ros.planning.diagnosis.explain import Reason
 
 START, GOAL, STRAIGHT_ON = (1.0, 1.0, 0.0), (9.0, 6.0, 0.0), (1.0, 6.0, 0.0)
 
@@ -179,7 +181,7 @@ def test_after_ctrl_c_what_was_done_is_told(monkeypatch, capsys):
             raise KeyboardInterrupt
         return judged(task)
 
-    monkeypatch.setattr("dubins_rrt_ros.cli.campaign.judged", interrupted)
+    monkeypatch.setattr("dubins_rrt_ros.evaluation.campaign.command.judged", interrupted)
     status, out, error = run("--problems", "5", capsys=capsys)
     assert status == 130 and "2 problems of seed 0" in out and error == "dubins_rrt campaign: interrupted\n"
 

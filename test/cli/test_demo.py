@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli import demo, planner_process
+from dubins_rrt_ros.cli.demo import command as demo
+from dubins_rrt_ros.cli.demo import process as planner_process
 from dubins_rrt_ros.cli.main import main
 
 

@@ -9,11 +9,12 @@ import pytest
 from cases import needs_compiled, random_map
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli import figures, figures_geometry
 from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.evaluation.figures import command as figures
+from dubins_rrt_ros.evaluation.figures import geometry as figures_geometry
 from dubins_rrt_ros.planning import ClearanceField, Vehicle
-from dubins_rrt_ros.planning.clearance import MARGIN
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning.collision.clearance import MARGIN
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "docs" / "figures"

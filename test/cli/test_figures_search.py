@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cases import needs_compiled
 
-from dubins_rrt_ros.cli import figures_search
-from dubins_rrt_ros.cli.plots import PATH
+from dubins_rrt_ros.cli.common.plots import PATH
+from dubins_rrt_ros.evaluation.figures import search as figures_search
 from dubins_rrt_ros.planning import ClearanceField
 
 pytestmark = needs_compiled  # interpreted, they take minutes

@@ -13,7 +13,7 @@ import pytest
 from cases import needs_compiled
 
 from dubins_rrt_ros.cli import main as program
-from dubins_rrt_ros.cli.flags import guard_numbers
+from dubins_rrt_ros.cli.common.flags import guard_numbers
 
 COMMANDS = ["plan", "audit", "bench", "campaign", "completion", "demo", "figures", "paper", "render"]
 ENDS = ["--start", "1.5", "2", "1.57", "--goal", "13.5", "10.5", "1.57"]

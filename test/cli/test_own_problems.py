@@ -5,10 +5,10 @@ from pathlib import Path
 
 from cases import needs_compiled
 
-from dubins_rrt_ros.cli.bench_problems import read_cases
+from dubins_rrt_ros.cli.bench.problems import read_cases
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.cli.paper_runs import ENVIRONMENTS, ROBOT_RADIUS, TURNING_RADIUS
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.evaluation.paper.runs import ENVIRONMENTS, ROBOT_RADIUS, TURNING_RADIUS
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 FILE = maps_directory() / "problems.json"
 

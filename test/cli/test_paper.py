@@ -15,9 +15,9 @@ from cases import needs_compiled
 from matplotlib.image import imread
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.cli.paper_runs import MARKS, TABLE, Measured, Outcome, Run
+from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, Outcome, Run
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform", "planning_time": 600.0}
 

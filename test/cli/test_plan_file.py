@@ -11,7 +11,7 @@ import shapely
 
 from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
-from dubins_rrt_ros.planning.wording import LONGEST
+from dubins_rrt_ros.planning.text import LONGEST
 
 FIGURES = ("time_to_first", "planning_time", "map_time", "length", "lower_bound", "gap", "min_clearance",
            "max_curvature")

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli import plots
+from dubins_rrt_ros.cli.common import plots
 from dubins_rrt_ros.planning import GridMap, PolygonMap, Vehicle
 
 L_SHAPE = np.array([[1.0, 1.0], [11.0, 1.0], [11.0, 6.0]])

@@ -8,21 +8,11 @@ from bounded import read_or_refused
 from hypothesis import given, settings
 from mutations import json_of, spoiled_documents
 
-from dubins_rrt_ros.cli.bench_problems import Case, read_cases
-from dubins_rrt_ros.cli.flags import UsageError
-from dubins_rrt_ros.cli.request import read_replay
-from dubins_rrt_ros.planning import (
-    InvalidPose,
-    MapError,
-    OptionError,
-    PolygonMap,
-    Problem,
-    Settings,
-    Vehicle,
-    options,
-    values,
-)
-from dubins_rrt_ros.planning.path import Path
+from dubins_rrt_ros.cli.bench.problems import Case, read_cases
+from dubins_rrt_ros.cli.common.flags import UsageError
+from dubins_rrt_ros.cli.common.request import read_replay
+from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, PolygonMap, Problem, Settings, Vehicle, options, values
+from dubins_rrt_ros.planning.curves.path import Path
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 
 HALL = PolygonMap(shapely.box(0, 0, 12, 10).difference(shapely.box(5, 0, 6, 6)))

@@ -21,9 +21,9 @@ from images import chunks_of, palette, pgm, png, png_of, row_of, saved
 from mutations import json_of, spoiled, spoiled_documents
 
 from dubins_rrt_ros.planning import GridMap, MapError, MapNotFound, load_map
-from dubins_rrt_ros.planning.map_images import read_image
-from dubins_rrt_ros.planning.map_polygons import parse_geojson
-from dubins_rrt_ros.share import find_map
+from dubins_rrt_ros.planning.maps.images import read_image
+from dubins_rrt_ros.planning.maps.locate import find_map
+from dubins_rrt_ros.planning.maps.polygons import parse_geojson
 
 MAPS = Path(__file__).parents[2] / "maps"
 MAX_CELLS = 10_000

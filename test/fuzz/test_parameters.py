@@ -15,7 +15,7 @@ from mutations import json_of, odd_values, spoiled
 from dubins_rrt_ros.node.parameter_files import as_yaml, unused_files
 from dubins_rrt_ros.node.parameters import OPTIONS, configuration
 from dubins_rrt_ros.planning import OptionError
-from dubins_rrt_ros.planning.wording import LONGEST
+from dubins_rrt_ros.planning.text import LONGEST
 
 DEFAULTS = {item.name: item.default for item in OPTIONS.values()}
 FILES = [{"/**": {"ros__parameters": {"samples": 10}}}, {"ns": {"planner": {"ros__parameters": {"seed": 1}}, "other": {}}}]

@@ -17,8 +17,19 @@ from std_srvs.srv import Trigger
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
 from dubins_rrt_ros.node.parameters import OPTIONS
-from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, Map, Path, Problem, Vehicle, audit, load_map, options
-from dubins_rrt_ros.share import find_map
+from dubins_rrt_ros.planning import (
+    ClearanceField,
+    DubinsCurve,
+    GridMap,
+    Map,
+    Path,
+    Problem,
+    Vehicle,
+    audit_path,
+    load_map,
+    options,
+)
+from dubins_rrt_ros.planning.maps.locate import find_map
 
 #: The package's own maps, both kinds; and what load_map refuses.
 OWN_MAPS = [f"{name}.{ending}" for name in ("block", "forest", "maze") for ending in ("yaml", "geojson")]
@@ -341,7 +352,7 @@ class Soak:
         """What the audit finds of a path for the vehicle of these parameters."""
         vehicle = Vehicle(**{item.name: values[item.name] for item in options(Vehicle)})
         problem = Problem(self._map_of(told), vehicle, path.start, path.end, allow_unknown=values["allow_unknown"])
-        return audit(path, problem).findings
+        return audit_path(path, problem).findings
 
 
 def stamped(pose: tuple[float, float, float], frame: str = "map") -> PoseStamped:

@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from dubins_rrt_ros.node.parameter_files import WIDTH, as_yaml, unused_files
 from dubins_rrt_ros.node.parameters import OPTIONS, READ_ONLY, Parameters, configuration
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
-from dubins_rrt_ros.planning.wording import LONGEST
+from dubins_rrt_ros.planning.text import LONGEST
 
 CONTRACT = {
     "map_file", "global_frame", "planner", "turning_radius", "wheelbase", "max_steering_angle", "robot_radius",

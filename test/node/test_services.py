@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 from yard import ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, load_map, save_map
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 
 @pytest.fixture(scope="module")

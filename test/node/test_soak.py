@@ -17,7 +17,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from cases import empty_map
 from soak import AT_REST, Soak, driven, length_of
 
-from dubins_rrt_ros.planning import Problem, Settings, Vehicle, audit, kernels_compiled, plan
+from dubins_rrt_ros.planning import Problem, Settings, Vehicle, audit_path, kernels_compiled, plan
 
 pytestmark = pytest.mark.skipif(not kernels_compiled, reason="too little happens in a minute with interpreted kernels")
 
@@ -71,11 +71,11 @@ def test_the_judge_of_published_poses_misses_nothing():
     path = plan(problem, Settings(planner="rrt", step_size=2.0, seed=1)).path
     poses = path.poses(0.05)
     assert length_of(poses) == pytest.approx(path.length, abs=1e-9)
-    assert audit(driven(poses, 2.0), problem).ok
-    assert not audit(driven(poses, 2.001), problem).ok
+    assert audit_path(driven(poses, 2.0), problem).ok
+    assert not audit_path(driven(poses, 2.001), problem).ok
     for index in (1, len(poses) // 2, -2):
         theta = poses[index, 2]
         for aside in ((-math.sin(theta), math.cos(theta), 0.0), (0.0, 0.0, 1.0)):
             moved = poses.copy()
             moved[index] += 1e-4 * np.array(aside)
-            assert "jumps" in audit(driven(moved, 2.0), problem).findings[0]
+            assert "jumps" in audit_path(driven(moved, 2.0), problem).findings[0]

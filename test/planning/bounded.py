@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hypothesis import currently_in_test_context, event
 
-from dubins_rrt_ros.planning.wording import LONGEST
+from dubins_rrt_ros.planning.text import LONGEST
 
 SECONDS, MEGABYTES = 5.0, 64
 #: What ends an allocation before it takes the machine down [bytes].

@@ -12,10 +12,10 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, PolygonMap, Problem, Vehicle, _kernels, kernels_compiled
-from dubins_rrt_ros.planning.chain import Chain
-from dubins_rrt_ros.planning.distance import DistanceField
-from dubins_rrt_ros.planning.dubins import WORDS, DubinsCurve, shortest
-from dubins_rrt_ros.planning.rrt import Search
+from dubins_rrt_ros.planning.curves.chain import Chain
+from dubins_rrt_ros.planning.curves.dubins import WORDS, DubinsCurve, shortest
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.rrt import Search
 
 #: By how much the budgets of the tests shrink where the kernels are interpreted, some fifty times slower.
 SCALE = 1 if kernels_compiled else 20

@@ -14,8 +14,8 @@ from cases import naive_clearance, random_maps, random_problem, scaled
 from naive import points_along
 
 from dubins_rrt_ros.planning import DubinsCurve, GridMap, Path, PolygonMap, Problem, Settings, Status, Vehicle, plan
-from dubins_rrt_ros.planning import audit as audit_function
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning import audit_path as audit_function
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 START, VIA, GOAL = (2.0, 2.0, 0.0), (6.0, 4.0, 1.0), (9.0, 9.0, 2.0)
 

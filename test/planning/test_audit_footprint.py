@@ -10,8 +10,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning import DubinsCurve, GridMap, Path, PolygonMap, Problem, Vehicle, audit, audit_obstacles, audit_sweep
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning import DubinsCurve, GridMap, Path, PolygonMap, Problem, Vehicle, audit_path
+from dubins_rrt_ros.planning.audit import obstacles as audit_obstacles
+from dubins_rrt_ros.planning.audit import sweep as audit_sweep
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 CAR = [(3.6, 0.9), (-0.9, 0.9), (-0.9, -0.9), (3.6, -0.9)]
 #: An L: its front right quarter is missing.
@@ -29,7 +31,7 @@ def path_of(*curves):
 
 def judged(map, vehicle, *curves, **request):
     path = path_of(*curves)
-    return audit(path, Problem(map, vehicle, path.start, path.end, **request))
+    return audit_path(path, Problem(map, vehicle, path.start, path.end, **request))
 
 
 def straight(x, y, theta, length):
@@ -95,7 +97,7 @@ POSES = st.tuples(st.floats(1.5, 6.5), st.floats(1.5, 6.5), st.floats(-3, 3))
 def test_the_verdict_is_that_of_the_polygon_at_many_poses(map, outline, poses, radius):
     vehicle = vehicle_of(outline, radius)
     path = path_of(*(shortest(a, b, radius) for a, b in pairwise(poses)))
-    verdict = audit(path, Problem(map, vehicle, path.start, path.end))
+    verdict = audit_path(path, Problem(map, vehicle, path.start, path.end))
     step = 0.01
     seen = least_distance(map, vehicle, path, step)
     # No corner moves faster than this, so that between the poses it may be that much nearer.
@@ -176,7 +178,7 @@ def test_a_post_inside_of_the_footprint_is_contact(kind):
         map = PolygonMap(shapely.box(0, 0, 20, 20) - shapely.box(10, 10, 10.1, 10.1))
     for x, free in ((9.0, False), (10.9, False), (6.39, True), (11.01, True)):
         pose = (x, 10.0, 0.0)
-        verdict = audit(Path(pose, pose, ()), Problem(map, vehicle_of(CAR), pose, pose))
+        verdict = audit_path(Path(pose, pose, ()), Problem(map, vehicle_of(CAR), pose, pose))
         assert verdict.ok == free
         assert verdict.min_clearance == pytest.approx(0.01 if free else 0.0, abs=1e-9)
 
@@ -281,7 +283,8 @@ def test_a_path_beyond_all_bounds_is_found(kind, length):
     for lengths in ((0.0, length, 0.0), (length, 0.0, 0.0), (0.0, length, length)):
         with np.errstate(all="ignore"):
             path = Path(start, start, (DubinsCurve(start, 5.0, "LSL", lengths),))
-            assert any("the footprint" in found for found in audit(path, Problem(map, vehicle_of(CAR), start, start)).findings)
+            findings = audit_path(path, Problem(map, vehicle_of(CAR), start, start)).findings
+            assert any("the footprint" in found for found in findings)
 
 
 @pytest.mark.parametrize("x", [12.5, 25.0])

@@ -9,9 +9,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning import DubinsCurve, Path, PolygonMap, Problem, Vehicle, audit
-from dubins_rrt_ros.planning.audit_poses import audit_poses, driven_length
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning import DubinsCurve, Path, PolygonMap, Problem, Vehicle, audit_path
+from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 YARD = PolygonMap(shapely.box(0, 0, 20, 20))
 LONG = Vehicle(turning_radius=1.0, footprint="[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]")
@@ -38,7 +38,7 @@ def bend(radius=1.0, spacing=0.05):
 def test_the_poses_of_curves_are_judged_as_the_curves_are(ends, spacing, vehicle):
     path = Path(ends[0], ends[-1], tuple(shortest(a, b, 1.0) for a, b in pairwise(ends)))
     poses = path.poses(spacing)
-    verdict, known = judged(poses, vehicle), audit(path, Problem(YARD, vehicle, path.start, path.end))
+    verdict, known = judged(poses, vehicle), audit_path(path, Problem(YARD, vehicle, path.start, path.end))
     assert verdict.ok and known.ok
     assert verdict.min_clearance == pytest.approx(known.min_clearance, rel=0.021, abs=0.001)
     assert driven_length(poses) == pytest.approx(path.length, abs=1e-6)

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from dubins_rrt_ros.planning import beside
+from dubins_rrt_ros.planning.search import background as beside
 
 
 @pytest.fixture(params=[1, 2], ids=["one core", "two cores"])

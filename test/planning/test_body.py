@@ -11,7 +11,7 @@ from shapely import affinity
 from test_footprint import CAR, OUTLINES
 
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap, Vehicle
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 MAPS = {
     "boxes": boxes_grid, "fine": lambda rng: boxes_grid(rng, side=150, resolution=0.08), "maze": maze_grid,

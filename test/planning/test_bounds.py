@@ -19,10 +19,11 @@ from cases import (
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, distance, plan
-from dubins_rrt_ros.planning.bounds import lower_bound
-from dubins_rrt_ros.planning.distance import DistanceField, free_blocks
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, plan
+from dubins_rrt_ros.planning.curves.dubins import shortest
+from dubins_rrt_ros.planning.diagnosis.bounds import lower_bound
+from dubins_rrt_ros.planning.search import cost_to_go as distance
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField, free_blocks
 
 MAPS = {
     "boxes": boxes_grid, "crowded": lambda rng: boxes_grid(rng, boxes=40), "maze": maze_grid,

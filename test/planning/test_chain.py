@@ -9,8 +9,8 @@ import pytest
 from cases import chain_of, chain_over, path_of, random_pose
 
 from dubins_rrt_ros.planning import Path
-from dubins_rrt_ros.planning.chain import Chain
-from dubins_rrt_ros.planning.dubins import WORDS, shortest
+from dubins_rrt_ros.planning.curves.chain import Chain
+from dubins_rrt_ros.planning.curves.dubins import WORDS, shortest
 
 
 def random_chain(rng, count=6):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap, Vehicle
-from dubins_rrt_ros.planning.dubins import shortest
+from dubins_rrt_ros.planning.curves.dubins import shortest
 
 MAPS = {
     "boxes": lambda rng: boxes_grid(rng), "unknown": lambda rng: boxes_grid(rng, unknown=True),

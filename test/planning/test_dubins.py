@@ -10,7 +10,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from dubins_rrt_ros.planning import WORDS, DubinsCurve
-from dubins_rrt_ros.planning.dubins import candidates, lengths, shortest
+from dubins_rrt_ros.planning.curves.dubins import candidates, lengths, shortest
 
 PI, TAU, HALF = math.pi, math.tau, math.pi / 2
 MIRROR = str.maketrans("LR", "RL")

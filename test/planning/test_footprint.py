@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dubins_rrt_ros.planning import Vehicle
-from dubins_rrt_ros.planning.footprint import cover
+from dubins_rrt_ros.planning.collision.footprint import cover
 
 CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
 OUTLINES = {

@@ -18,11 +18,11 @@ from cases import (
     scaled,
 )
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, audit, load_map, plan
-from dubins_rrt_ros.planning.distance import DistanceField
-from dubins_rrt_ros.planning.headings import SPREAD, UNIFORM_SHARE
-from dubins_rrt_ros.planning.sampling import Sampler
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
+from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.headings import SPREAD, UNIFORM_SHARE
+from dubins_rrt_ros.planning.search.sampling import Sampler
 
 KINDS = ("uniform", "goal", "field", "mixed")
 
@@ -131,7 +131,7 @@ def test_every_kind_solves_the_maze(kind):
         settings = Settings(samples=1500, seed=seed, heading_sampling=kind, planning_time=60.0)
         result = plan(problem, settings)
         assert result.status == Status.NONE
-        assert audit(result.path, problem).ok
+        assert audit_path(result.path, problem).ok
         if seed == 0:
             again = plan(problem, settings)
             assert again.path.poses(0.1).tobytes() == result.path.poses(0.1).tobytes()
@@ -146,4 +146,4 @@ def test_headings_on_random_problems(kind):
         poses = drawn(problem, 300, heading_sampling=kind)
         assert np.isfinite(poses).all()
         result = plan(problem, Settings(samples=scaled(200, least=20), seed=seed, heading_sampling=kind, planning_time=60.0))
-        assert result.path is None or audit(result.path, problem).ok
+        assert result.path is None or audit_path(result.path, problem).ok

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from cases import SCALE, empty_map, field_of, interpreted, needs_compiled, path_of, random_maps, random_problem, scaled
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit, load_map
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path, load_map
 from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar
-from dubins_rrt_ros.planning.chain import Chain
-from dubins_rrt_ros.planning.distance import DistanceField
-from dubins_rrt_ros.planning.dubins import WORDS, shortest
-from dubins_rrt_ros.planning.hybrid_astar import FIRST_RUNS, HybridAStarRuns
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.curves.chain import Chain
+from dubins_rrt_ros.planning.curves.dubins import WORDS, shortest
+from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.hybrid_astar import FIRST_RUNS, HybridAStarRuns
 
 VEHICLE = Vehicle(0.5, 0.2)
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
@@ -70,7 +70,7 @@ def check(chain, problem):
         at = chain.poses[i]
     assert math.dist(path.end[:2], problem.goal[:2]) <= problem.goal_tolerance_xy
     assert abs(math.remainder(path.end[2] - problem.goal[2], math.tau)) <= problem.yaw_tolerance + 1e-9
-    assert audit(path, problem).ok
+    assert audit_path(path, problem).ok
 
 
 @needs_compiled

@@ -23,8 +23,8 @@ from dubins_rrt_ros.planning import (
     TreeError,
     plan,
 )
-from dubins_rrt_ros.planning.dubins import shortest
-from dubins_rrt_ros.planning.polish import polished
+from dubins_rrt_ros.planning.curves.dubins import shortest
+from dubins_rrt_ros.planning.search.smoothing import polished
 
 PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 KINDS = {"rrt": {"planner": "rrt"}, "rrt_star": {"planner": "rrt_star"},

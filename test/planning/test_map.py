@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning.map import FREE, OCCUPIED, GridMap, MapError, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, GridMap, MapError, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
 

@@ -9,9 +9,9 @@ import shapely
 from images import pgm
 from PIL import Image
 
-from dubins_rrt_ros.planning.map import GridMap, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
-from dubins_rrt_ros.planning.map_files import load_map, save_map
-from dubins_rrt_ros.planning.wording import LONGEST
+from dubins_rrt_ros.planning.maps.files import load_map, save_map
+from dubins_rrt_ros.planning.maps.model import GridMap, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
+from dubins_rrt_ros.planning.text import LONGEST
 
 MAPS = Path(__file__).parents[2] / "maps"
 FIELDS = {"image": "m.pgm", "resolution": "0.05", "origin": "[0, 0, 0]", "negate": "0",
@@ -289,7 +289,7 @@ def test_messages_of_long_and_deep_values_are_short(tmp_path):
 
 
 def test_long_polygon_files_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.map_files.MAX_POLYGON_BYTES", 50)
+    monkeypatch.setattr("dubins_rrt_ros.planning.maps.files.MAX_POLYGON_BYTES", 50)
     (tmp_path / "m.geojson").write_text(" " * 51)
     assert "larger than 50 bytes" in refusal(tmp_path / "m.geojson")
 

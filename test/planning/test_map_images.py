@@ -9,8 +9,8 @@ import pytest
 from images import chunks_of, palette, pgm, png, png_of, row_of, saved
 from PIL import Image
 
-from dubins_rrt_ros.planning.map import MapError
-from dubins_rrt_ros.planning.map_images import read_image
+from dubins_rrt_ros.planning.maps.images import read_image
+from dubins_rrt_ros.planning.maps.model import MapError
 
 ROW = np.array([[0, 100, 205, 254]])
 
@@ -169,7 +169,7 @@ def test_our_limit_replaces_pillows_guard(monkeypatch):
 def test_long_plain_pgm_is_refused(monkeypatch):
     with pytest.raises(MapError, match="more than 65552 bytes for 1 pixels; save it as binary PGM"):
         read(b"P2 1 1 255 " + b"0 " * 40_000)
-    monkeypatch.setattr("dubins_rrt_ros.planning.map_images.MAX_PLAIN_PGM_BYTES", 10)
+    monkeypatch.setattr("dubins_rrt_ros.planning.maps.images.MAX_PLAIN_PGM_BYTES", 10)
     with pytest.raises(MapError, match="more than 10 bytes for 9 pixels; save it as binary PGM"):
         read(b"P2 9 1 255 1 2 3 4 5 6 7 8 9")
 

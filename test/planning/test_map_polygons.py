@@ -5,8 +5,8 @@ import json
 import pytest
 import shapely
 
-from dubins_rrt_ros.planning.map import MapError, PolygonMap
-from dubins_rrt_ros.planning.map_polygons import parse_geojson, parse_wkt
+from dubins_rrt_ros.planning.maps.model import MapError, PolygonMap
+from dubins_rrt_ros.planning.maps.polygons import parse_geojson, parse_wkt
 
 SQUARE = [[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]
 POST = [[4, 4], [6, 4], [6, 6], [4, 6], [4, 4]]

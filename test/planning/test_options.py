@@ -6,17 +6,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from dubins_rrt_ros.planning import (
-    GridMap,
-    InvalidPose,
-    OptionError,
-    Problem,
-    Settings,
-    Vehicle,
-    checked_pose,
-    options,
-    values,
-)
+from dubins_rrt_ros.planning import GridMap, InvalidPose, OptionError, Problem, Settings, Vehicle, checked_pose, options, values
 
 MAP = GridMap(np.zeros((4, 4)), 1.0)
 MAKE = {Settings: Settings, Vehicle: Vehicle,

@@ -8,17 +8,8 @@ import shapely
 from cases import empty_map, needs_compiled, scaled
 from planner_cases import GOAL, START, VEHICLE, assert_refused, settings, walled
 
-from dubins_rrt_ros.planning import (
-    GridMap,
-    PolygonMap,
-    Problem,
-    Status,
-    Vehicle,
-    audit,
-    load_map,
-    plan,
-)
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Status, Vehicle, audit_path, load_map, plan
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -56,7 +47,7 @@ def test_solves(planner):
 def test_solves_the_maze(maze, planner, seed):
     result = plan(maze, settings(planner, seed=seed))
     assert result.status == Status.NONE
-    assert audit(result.path, maze).ok
+    assert audit_path(result.path, maze).ok
     assert 20 < result.length < (25 if planner == "rrt_star" else 60)
 
 
@@ -160,7 +151,7 @@ def test_the_tolerance_excuses_a_goal_outside_or_in_an_obstacle(planner, goal, a
                       any_goal_heading=any_heading)
     result = plan(problem, settings(planner, samples=scaled(6000, least=3000)))
     assert result.status == Status.NONE, result.message
-    assert audit(result.path, problem).ok
+    assert audit_path(result.path, problem).ok
     assert math.dist(result.path.end[:2], goal[:2]) <= 0.6
     assert result.min_clearance >= 0.2
     exact = plan(Problem(problem.map, VEHICLE, START, goal), settings(planner))
@@ -226,7 +217,7 @@ def test_a_path_that_fails_the_audit_is_a_defect_and_not_a_path(planner, monkeyp
     from dubins_rrt_ros.planning import planner as module
 
     def strict(path, problem):
-        return audit(path, Problem(problem.map, Vehicle(0.5, 5.0), problem.start, problem.goal))
+        return audit_path(path, Problem(problem.map, Vehicle(0.5, 5.0), problem.start, problem.goal))
 
     monkeypatch.setattr(module, "audit", strict)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))

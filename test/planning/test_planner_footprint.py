@@ -8,8 +8,19 @@ import pytest
 import shapely
 from cases import SCALE, needs_compiled
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, audit, load_map, plan
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning import (
+    ClearanceField,
+    GridMap,
+    PolygonMap,
+    Problem,
+    Settings,
+    Status,
+    Vehicle,
+    audit_path,
+    load_map,
+    plan,
+)
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 ROBOT = "[[0.6, 0.3], [-0.6, 0.3], [-0.6, -0.3], [0.6, -0.3]]"
 CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
@@ -22,7 +33,7 @@ def checked(problem, **settings):
     result.check()
     result.tree.check(ClearanceField.of(problem.map, problem.allow_unknown), problem.vehicle)
     if result.path:
-        assert audit(result.path, problem).ok
+        assert audit_path(result.path, problem).ok
     return result
 
 

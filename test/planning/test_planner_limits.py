@@ -7,8 +7,8 @@ import pytest
 from cases import SCALE, empty_map
 from planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
-from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit, plan, prepare
-from dubins_rrt_ros.planning.polish import polished
+from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit_path, plan, prepare
+from dubins_rrt_ros.planning.search.smoothing import polished
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -64,7 +64,7 @@ def test_the_time_to_the_first_path_is_without_its_polishing(planner, monkeypatc
         time.sleep(0.05)
         return polished(*arguments)
 
-    monkeypatch.setattr("dubins_rrt_ros.planning.rrt.polished", slowly)
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.rrt.polished", slowly)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, samples=200, goal_bias=0.5))
     assert 0 < result.time_to_first < result.planning_time - 0.05
 
@@ -123,7 +123,7 @@ def test_cancelled_while_the_clearance_field_was_computed(planner, monkeypatch):
 
 def test_prepare_does_what_does_not_depend_on_the_request(monkeypatch):
     from dubins_rrt_ros.planning import ClearanceField
-    from dubins_rrt_ros.planning import clearance as module
+    from dubins_rrt_ros.planning.collision import clearance as module
 
     map = walled(-1)
     prepare(map, VEHICLE, allow_unknown=True)
@@ -169,7 +169,7 @@ def test_progress_tells_of_every_better_path():
         if snapshot.path:
             assert snapshot.message.startswith(f"Path of {snapshot.length:.2f} m so far, at most ")
             assert snapshot.audit == "ok"
-            assert audit(snapshot.path, problem).ok
+            assert audit_path(snapshot.path, problem).ok
             assert snapshot.length == pytest.approx(progress.length)
             assert isinstance(snapshot.tree, Tree)
 

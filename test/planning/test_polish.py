@@ -19,8 +19,9 @@ from cases import (
     search_on,
 )
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit, dubins
-from dubins_rrt_ros.planning.polish import polished
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path
+from dubins_rrt_ros.planning.curves import dubins
+from dubins_rrt_ros.planning.search.smoothing import polished
 
 COUNT = 60 if SCALE == 1 else 6
 VEHICLE = Vehicle(0.5, 0.2)
@@ -60,7 +61,7 @@ def check(chain, problem, clearance):
         assert clearance(points).min() >= problem.vehicle.robot_radius - 1e-9
         at = naive.drive(curve.start, curve.word, curve.lengths, curve.radius)
     assert_close(at, path.end)
-    assert audit(path, problem).ok
+    assert audit_path(path, problem).ok
 
 
 def assert_close(pose, other):
@@ -137,7 +138,7 @@ def test_no_shortcut_leads_through_a_thin_wall(seed):
     """The path tightens around its end: what is left above the shortest way of a point around the disc is for the turns."""
     problem, chain = walled()
     shorter, lengths = polish(chain, VEHICLE, field_of(problem), times=scaled(8, least=2), seed=seed)
-    assert audit(path_of(shorter, 0.5), problem).ok
+    assert audit_path(path_of(shorter, 0.5), problem).ok
     assert path_of(shorter, 0.5).poses(0.01)[:, 1].max() > 5.2
     around = 2 * math.hypot(2.85, 5.0)
     assert around < shorter.length < chain.length - 0.3
@@ -155,7 +156,7 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
     shorter, _ = polish(chain, problem.vehicle, field_of(problem))
     assert shorter.length == pytest.approx(16, abs=1e-9)
     assert len(shorter.words) == 2
-    assert audit(path_of(shorter, 0.5), problem).ok
+    assert audit_path(path_of(shorter, 0.5), problem).ok
 
 
 @pytest.mark.parametrize("poses", [

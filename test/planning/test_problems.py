@@ -7,7 +7,7 @@ import pytest
 from cases import SCALE, random_maps, random_problem, scaled
 from naive import drive, points_along
 
-from dubins_rrt_ros.planning import ClearanceField, Settings, Status, audit, plan
+from dubins_rrt_ros.planning import ClearanceField, Settings, Status, audit_path, plan
 
 POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIMEOUT, Status.NO_VALID_PATH}
 COUNT = 150 if SCALE == 1 else 15
@@ -38,7 +38,7 @@ def test_random_problems(planner):
 def check_path(result, clearance):
     """The audit passes, and so does a drive along the path in small steps."""
     problem, path = result.problem, result.path
-    assert audit(path, problem).ok
+    assert audit_path(path, problem).ok
     at = np.array(problem.start)
     least = clearance(at[None, :2])[0]
     for curve in path.curves:

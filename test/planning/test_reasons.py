@@ -21,9 +21,9 @@ from dubins_rrt_ros.planning import (
     kernels_compiled,
     plan,
 )
-from dubins_rrt_ros.planning import bounds as bounds_module
-from dubins_rrt_ros.planning.bounds import has_no_room, lattice_spacing, nearest_in_map
-from dubins_rrt_ros.planning.reasons import nearest_obstacle
+from dubins_rrt_ros.planning.diagnosis import bounds as bounds_module
+from dubins_rrt_ros.planning.diagnosis.bounds import has_no_room, lattice_spacing, nearest_in_map
+from dubins_rrt_ros.planning.diagnosis.explain import nearest_obstacle
 
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
 TURNED = (3.0, -2.0, 0.7)

@@ -7,11 +7,11 @@ import pytest
 from cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map
-from dubins_rrt_ros.planning.distance import DistanceField
-from dubins_rrt_ros.planning.dubins import shortest
-from dubins_rrt_ros.planning.rrt import BLOCK, Search
-from dubins_rrt_ros.planning.sampling import Sampler
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.curves.dubins import shortest
+from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.rrt import BLOCK, Search
+from dubins_rrt_ros.planning.search.sampling import Sampler
 
 PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 

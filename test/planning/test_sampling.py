@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from cases import SCALE, boxes_grid, chain_over, empty_map, field_of, holed_polygons, maze_grid, scaled, search_on
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, rrt, sampling
-from dubins_rrt_ros.planning.distance import DistanceField
-from dubins_rrt_ros.planning.sampling import Sampler
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle
+from dubins_rrt_ros.planning.search import rrt, sampling
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.sampling import Sampler
 
 START, GOAL = (-4.0, -3.0, 0.0), (4.0, 3.0, 1.0)
 APART = 10.0

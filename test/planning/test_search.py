@@ -20,11 +20,13 @@ from cases import (
     search_on,
 )
 
-from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit, beside, load_map, plan, rrt
-from dubins_rrt_ros.planning.bounds import lower_bound
-from dubins_rrt_ros.planning.distance import DistanceField
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
+from dubins_rrt_ros.planning.diagnosis.bounds import lower_bound
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
-from dubins_rrt_ros.share import maps_directory
+from dubins_rrt_ros.planning.search import background as beside
+from dubins_rrt_ros.planning.search import rrt
+from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
 
 BUDGETS = (1, 7, rrt.BLOCK - 1, rrt.BLOCK, rrt.BLOCK + 1, 1100, 3000) if SCALE == 1 else (1, 7, 20, 40)
 KINDS = ["maze", "polygons", "late", "brief"] if SCALE == 1 else ["maze"]
@@ -129,7 +131,7 @@ def test_the_best_path_on_random_problems(seed):
         assert reaching[search.best]
         assert search.length <= tree.costs[reaching].min() + 1e-9
         assert search.path == tree.path_to(search.best)
-        assert audit(search.path, problem).ok
+        assert audit_path(search.path, problem).ok
         bound = lower_bound(problem, DistanceField.to_goal(problem, field_of(problem)).make_bound())
         assert search.length >= bound - 1e-9
 
@@ -220,7 +222,7 @@ def test_a_narrow_street_is_solved_by_every_seed():
     for seed in range(20):
         result = plan(problem, Settings(samples=600, seed=seed, planning_time=60.0))
         assert result.status == Status.NONE, result.message
-        assert audit(result.path, problem).ok
+        assert audit_path(result.path, problem).ok
         assert result.length < 1.25 * result.lower_bound
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from dubins_rrt_ros.planning import load_map
-from dubins_rrt_ros.planning.map import MapNotFound
-from dubins_rrt_ros.share import find_map, maps_directory
+from dubins_rrt_ros.planning.maps.locate import find_map, maps_directory
+from dubins_rrt_ros.planning.maps.model import MapNotFound
 
 
 def refusal(name):

@@ -13,9 +13,9 @@ from naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
 from dubins_rrt_ros.planning._kernels.widest import Flood
-from dubins_rrt_ros.planning.bounds import are_separated, lattice_spacing, widest_way
-from dubins_rrt_ros.planning.clearance import MARGIN
-from dubins_rrt_ros.planning.reasons import before_search
+from dubins_rrt_ros.planning.collision.clearance import MARGIN
+from dubins_rrt_ros.planning.diagnosis.bounds import are_separated, lattice_spacing, widest_way
+from dubins_rrt_ros.planning.diagnosis.explain import before_search
 
 
 @pytest.mark.parametrize("seed", range(scaled(30, least=6)))

@@ -1,0 +1,1 @@
+"""`dubins_rrt bench`: time and path length over problems and seeds."""

@@ -1,0 +1,170 @@
+"""`dubins_rrt bench`: plan a file of problems with many seeds, and compare what several planners did."""
+
+import argparse
+import contextlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dubins_rrt_ros.planning import Settings, options
+from dubins_rrt_ros.planning.option import option
+
+from ..common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
+from ..common.progress import with_bar
+from .problems import chosen, read_cases
+from .records import Best, Runs, best_known, grouped, read_best_known, read_runs, run_of
+from .report import summary, to_document, to_markdown
+from .runs import Task, results
+
+DEFAULT_TIME = 5.0
+_HIGHEST = {item.name: item.high for item in options(Settings)}
+#: The arguments that a report takes, and those of every call; all others are for measuring.
+_OF_REPORT, _OF_ALL = {"report", "best_known", "plot", "plot_samples"}, {"command", "run", "out", "json"}
+
+
+@dataclass(frozen=True)
+class _Flags(Settings):
+    """The settings with flags of their own names; those that are no option() here, the bench sets in its own way."""
+
+    samples: int = option(_HIGHEST["samples"], "how many samples are drawn at most", low=1, high=_HIGHEST["samples"])
+    planning_time: float = DEFAULT_TIME
+    path_spacing: float = 0.0
+    seed: int = 0
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subparsers, "bench", usage="(PROBLEMS.json --out FILE | --report FILE [FILE ...]) [options]",
+        help="measure the planner on a file of problems, and compare", argument_default=argparse.SUPPRESS,
+        description="Plans every problem of a file with several seeds and writes a line of JSON for each run, as soon as it is "
+                    "done; or, with --report, compares the runs in such files.",
+        notes="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
+              "the path; with both, whichever is used up first. Where it is interrupted, the lines written by then stay.",
+        examples=["dubins_rrt render maze.geojson --out .",
+                  'echo \'[{"name": "maze", "map": "maze.yaml", "start": [1.5, 2, 1.57], "goal": [13.5, 10.5, 1.57],\' \\',
+                  "    '\"turning_radius\": 1, \"robot_radius\": 0.2}]' > problems.json",
+                  "dubins_rrt bench problems.json --samples 1000 --seeds 3 --out ours.jsonl",
+                  "dubins_rrt bench problems.json --samples 1000 --seeds 3 --no-informed --label plain --out plain.jsonl",
+                  "dubins_rrt bench --report ours.jsonl plain.jsonl --plot report.png"],
+        exit_status="0 all runs solved or a report, 1 some run unsolved, 2 wrong usage, 130 interrupted")
+    parser.add_argument("--out", metavar="FILE", help="where to write: the lines of JSON; with --report the report as Markdown, "
+                                                      "which goes to standard output otherwise")
+    add_json_flag(parser, "what the runs amount to")
+    _add_measuring(parser.add_argument_group("measuring"))
+    add_option_flags(parser, "settings", _Flags)
+    _add_report(parser.add_argument_group("report"))
+    parser.set_defaults(run=run)
+
+
+def _add_measuring(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("file", metavar="PROBLEMS.json", nargs="?",
+                       help="a list of {name, map (relative to the file), start, goal, turning_radius, robot_radius}")
+    group.add_argument("--problems", metavar="NAME[,NAME]", help="only these; default all")
+    group.add_argument("--seeds", metavar="N", type=int, help="plan each problem with the seeds 0 to N-1; default 1")
+    group.add_argument("--time", metavar="s", type=float,
+                       help=f"the time limit of a run [s]; default {DEFAULT_TIME:g}, or none where --samples is given")
+    group.add_argument("--jobs", metavar="N", type=int,
+                       help="run in N processes; default 1, for processes that share cores spoil each other's timings")
+    group.add_argument("--label", metavar="NAME", help="the name of these runs in a report; default the planner's")
+
+
+def _add_report(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--report", metavar="FILE", nargs="+", help="compare the runs in these files, in place of measuring")
+    group.add_argument("--best-known", metavar="FILE",
+                       help="the shortest known lengths, {problem: m}; by default the best of the runs")
+    group.add_argument("--plot", metavar="FILE", help="draw cost over time; .png, .svg or .pdf")
+    group.add_argument("--plot-samples", metavar="FILE",
+                       help="draw what a sample costs over the size of the tree, a point for each label; .png, .svg or .pdf")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure or report, and return the exit status."""
+    given = vars(arguments)
+    if "report" in given and (measuring := given.keys() - _OF_ALL - _OF_REPORT):
+        raise UsageError(f"--report compares runs that are done and measures none; leave out {_flags(measuring)}")
+    if "report" not in given and (reporting := given.keys() & _OF_REPORT):
+        raise UsageError(f"{_flags(reporting)} goes with --report alone; leave it out to measure")
+    _check_outputs(given)
+    return _report(given) if "report" in given else _measure(arguments)
+
+
+def _check_outputs(given: dict[str, Any]) -> None:
+    """Refuse files that cannot be written, or that would be written over before they are read."""
+    out, plots = given.get("out"), [given.get("plot"), given.get("plot_samples")]
+    check_folder(out, *plots, given["json"])
+    for plot in plots:
+        check_drawing(plot)
+    sources = given.get("report", [given["file"]] if "file" in given else [])
+    if out and Path(out).resolve() in [Path(source).resolve() for source in sources]:
+        raise UsageError(f"--out {out} would overwrite what is read; name another file")
+
+
+def _flags(names: Iterable[str]) -> str:
+    return ", ".join(sorted("PROBLEMS.json" if name == "file" else "--" + name.replace("_", "-") for name in names))
+
+
+def _measure(arguments: argparse.Namespace) -> int:
+    tasks, jobs = _tasks(arguments), _count(arguments, "jobs")
+    lines = []
+    with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(results(tasks, jobs)) as running:
+        for line in with_bar(running, len(tasks), " runs"):
+            out.write(json.dumps(line, allow_nan=False) + "\n")
+            out.flush()
+            lines.append(line)
+    runs = grouped(map(run_of, lines))
+    _write_json(arguments.json, runs, best_known(runs, {}))
+    print(summary(runs), file=words_for(arguments.json))
+    return 0 if all(line["solved"] for line in lines) else 1
+
+
+def _tasks(arguments: argparse.Namespace) -> list[Task]:
+    """The runs in order, those of a problem after each other."""
+    missing = [name for name, key in (("PROBLEMS.json", "file"), ("--out", "out")) if key not in arguments]
+    if missing:
+        raise UsageError(f"{' and '.join(missing)} must be given, to measure; or --report, to compare")
+    settings, seeds = _settings(arguments), range(_count(arguments, "seeds"))
+    cases = read_cases(arguments.file)
+    if "problems" in arguments:
+        cases = chosen(cases, arguments.problems.split(","))
+    label = getattr(arguments, "label", settings.planner)
+    return [Task(case, replace(settings, seed=seed), label) for case in cases for seed in seeds]
+
+
+def _settings(arguments: argparse.Namespace) -> Settings:
+    given = given_options(arguments, _Flags)
+    time = getattr(arguments, "time", _HIGHEST["planning_time"] if "samples" in given else DEFAULT_TIME)
+    return Settings(**{"samples": _HIGHEST["samples"], "planning_time": time} | given)
+
+
+def _count(arguments: argparse.Namespace, name: str) -> int:
+    count = getattr(arguments, name, 1)
+    if count < 1:
+        raise UsageError(f"--{name} is {count}; give 1 or more")
+    return count
+
+
+def _report(given: dict[str, Any]) -> int:
+    runs = read_runs(given["report"])
+    best = best_known(runs, read_best_known(given["best_known"]) if "best_known" in given else {})
+    if "plot" in given:
+        from .plots import draw_runs  # here, for matplotlib takes long to import
+        draw_runs(given["plot"], runs, best)
+    if "plot_samples" in given:
+        from .plots import draw_sample_costs
+        draw_sample_costs(given["plot_samples"], runs)
+    _write_json(given["json"], runs, best)
+    text = to_markdown(runs, best)
+    if given.get("out", STDOUT) == STDOUT:
+        print(text, end="", file=words_for(given["json"]))
+    else:
+        Path(given["out"]).write_text(text, encoding="utf-8")
+    return 0
+
+
+def _write_json(file: str | None, runs: Runs, best: Mapping[str, Best]) -> None:
+    if file:
+        write_document(file, finite(to_document(runs, best)))

@@ -1,0 +1,165 @@
+"""The lines of JSON that `dubins_rrt bench` writes, read again, and the shortest lengths known of their problems."""
+
+import json
+import math
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from ..common.flags import UsageError
+from .problems import read_json, read_text
+
+
+class Run(NamedTuple):
+    """One run.
+
+    Attributes:
+        problem, planner, seed: what was run.
+        solved: whether it has a path that passed its check.
+        trace: (seconds, cost [m]) of each improvement, the costs falling with time; none of a run that is not solved.
+        end: until when it is known what the run has [s]: it was cut short then, if it did not end by itself.
+        total: how long it took, at most the time it was given [s].
+        samples, nodes: how many samples were drawn, and how many nodes the tree has; 0 where the line does not tell.
+    """
+
+    problem: str
+    planner: str
+    seed: int
+    solved: bool
+    trace: tuple[tuple[float, float], ...]
+    end: float
+    total: float
+    samples: int
+    nodes: int
+
+    @property
+    def first(self) -> tuple[float, float]:
+        """When its first path came [s], and its cost [m]."""
+        return self.trace[0] if self.trace else (math.inf, math.inf)
+
+    @property
+    def cost(self) -> float:
+        """Of its best path [m]."""
+        return self.trace[-1][1] if self.trace else math.inf
+
+    def cost_at(self, time: float) -> float:
+        """Of the best path by then [m]."""
+        done = bisect_right(self.trace, (time, math.inf))
+        return self.trace[done - 1][1] if done and time <= self.end else math.inf
+
+    def time_to(self, cost: float) -> float:
+        """Until its path cost no more than that [s]."""
+        return next((at for at, reached in self.trace if reached <= cost), math.inf)
+
+
+class Best(NamedTuple):
+    """The shortest length known of a problem [m], and where it comes from."""
+
+    cost: float
+    source: str
+
+
+#: The runs by problem, then by planner.
+Runs = Mapping[str, Mapping[str, list[Run]]]
+
+
+def run_of(line: Mapping[str, Any]) -> Run:
+    """The run that a line of `dubins_rrt bench` tells of, or of a program that writes the same.
+
+    Its check is the field `audit`, which is "ok", or `verify.step_ok`; without either `solved` is believed. `samples` and
+    `vertices` need not be there.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: the line has not the fields it must have.
+    """
+    if not isinstance(line, Mapping):
+        raise TypeError("it is no object")
+    passed = line.get("audit", "ok") == "ok" and line.get("verify", {}).get("step_ok", True)
+    solved = bool(line["solved"] and passed)
+    limit, total = float(line.get("time_limit") or math.inf), float(line["total_s"])
+    if not 0 <= total < math.inf:
+        raise ValueError(f"its total_s is {total:g}")
+    trace = _improvements(line["trace"]) if solved else ()
+    if solved and not trace:
+        raise ValueError("it is solved, but its trace is empty")
+    return Run(str(line["problem"]), str(line["planner"]), int(line["seed"]), solved, trace, max(limit, total), min(limit, total),
+               int(line.get("samples") or 0), int(line.get("vertices") or 0))
+
+
+def _improvements(trace: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """The entries of a trace that improve on all before."""
+    improvements = []
+    for time, cost in sorted((float(time), float(cost)) for time, cost in trace):
+        if not (0 <= time < math.inf and 0 <= cost < math.inf):
+            raise ValueError(f"its trace holds [{time:g}, {cost:g}]")
+        if not improvements or cost < improvements[-1][1]:
+            improvements.append((time, cost))
+    return tuple(improvements)
+
+
+def grouped(runs: Iterable[Run]) -> Runs:
+    """The runs by problem and planner, both in the order in which they came."""
+    groups = {}
+    for run in runs:
+        groups.setdefault(run.problem, {}).setdefault(run.planner, []).append(run)
+    return groups
+
+
+def read_runs(files: Iterable[str]) -> Runs:
+    """The runs in files of JSON lines.
+
+    Raises:
+        UsageError: a file cannot be read, a line is none of a run, a run is there twice, or there is none.
+    """
+    runs, places = [], {}
+    for file in files:
+        for number, text in enumerate(read_text(file).split("\n"), 1):
+            if not text.strip():
+                continue
+            place = f"{file}, line {number}"
+            run = _read_run(text, place)
+            before = places.setdefault((run.problem, run.planner, run.seed), place)
+            if before != place:
+                raise UsageError(f"{place} is the run of {run.planner} on {run.problem} with seed {run.seed} again, after "
+                                 f"{before}; leave one out, or tell the rows apart by `dubins_rrt bench --label`")
+            runs.append(run)
+    if not runs:
+        raise UsageError("there are no runs to report; give files that `dubins_rrt bench --out` wrote")
+    return grouped(runs)
+
+
+def _read_run(text: str, place: str) -> Run:
+    try:
+        return run_of(json.loads(text))
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise UsageError(f"{place} is no run, for {reason}; give files that `dubins_rrt bench --out` wrote, and drop lines that "
+                         "were cut short") from error
+
+
+def read_best_known(file: str) -> dict[str, float]:
+    """The lengths in a file {problem: m} or {problem: {"cost": m}} [m].
+
+    Raises:
+        UsageError: it is no such file.
+    """
+    document = read_json(file)
+    entries = document.items() if isinstance(document, dict) else [("", document)]
+    costs = {name: entry.get("cost") if isinstance(entry, dict) else entry for name, entry in entries}
+    wrong = [name for name, cost in costs.items() if type(cost) not in (int, float) or not 0 < cost < math.inf]
+    if wrong:
+        raise UsageError(f"{file}: what it has for {wrong[0] or 'the problems'} is no length; give {{problem: metres, ...}}")
+    return costs
+
+
+def best_known(runs: Runs, given: Mapping[str, float]) -> dict[str, Best]:
+    """The shortest known length of each problem: the given one, or that of a run where it is shorter or none is given."""
+    return {problem: _best(planners, given.get(problem)) for problem, planners in runs.items()}
+
+
+def _best(planners: Mapping[str, list[Run]], given: float | None) -> Best:
+    run = min((run for group in planners.values() for run in group), key=lambda run: run.cost)
+    if given is not None and given <= run.cost:
+        return Best(given, "as given")
+    found = f"the best of these runs, of {run.planner} with seed {run.seed}" if run.solved else "no run is solved"
+    return Best(run.cost, found if given is None else f"**new**: {found}, below the {given:.4f} m given")

@@ -1,0 +1,175 @@
+"""What runs of planners amount to: statistics, and the report in Markdown.
+
+A median is the lower one and a quartile its like: the least value that at least this share of the runs does not exceed, so that
+each is a value that was measured. Runs without a path that passed its check count, as infinite.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from .records import Best, Run, Runs
+
+#: When costs are looked at [s], and above the best known by which shares.
+MARKS, SHARES = (0.05, 0.1, 0.3, 1.0, 5.0), (0.05, 0.02, 0.01)
+
+EXPLANATION = """\
+Lengths are in metres; times count from the request on, with the map prepared. Each figure is the lower median over all runs of a
+planner, in brackets the quartiles: values that were measured. A run is solved where its path passed its check; the others count
+as infinite. A dash is an infinite figure, or one at a mark that the runs were cut short before.
+"""
+
+
+def quantile(values: Iterable[float], share: float) -> float:
+    """The least value that at least this share of the values does not exceed."""
+    ordered = sorted(values)
+    return ordered[max(math.ceil(share * len(ordered)) - 1, 0)]
+
+
+def quartiles(values: Iterable[float]) -> dict[str, float]:
+    """The three values that split them into quarters, by name."""
+    ordered = sorted(values)
+    names = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75}
+    return {name: quantile(ordered, share) for name, share in names.items()}
+
+
+def median(values: Iterable[float]) -> float:
+    """The lower median."""
+    return quantile(values, 0.5)
+
+
+def marks_of(runs: Runs) -> list[float]:
+    """The marks within the time of the longest run [s]; the first in any case."""
+    longest = max(run.total for planners in runs.values() for group in planners.values() for run in group)
+    return [mark for mark in MARKS if mark <= max(longest, MARKS[0])]
+
+
+def ratio(cost: float, best: Best) -> float:
+    """A cost by the best known one; infinite where there is none of either."""
+    if math.isinf(cost):
+        return math.inf
+    return cost / best.cost if best.cost > 0 else 1.0  # a start that is the goal: all lengths are 0
+
+
+def summary(runs: Runs) -> str:
+    """A line for each problem: how many runs are solved, and the medians."""
+    return "\n".join(f"{problem}: {sum(run.solved for run in group)}/{len(group)} solved, "
+                     f"first path {milliseconds(median(run.first[0] for run in group))} ms, "
+                     f"{metres(median(run.cost for run in group))} m"
+                     for problem, planners in runs.items() for group in planners.values())
+
+
+def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
+    """The report: all problems in one table, then a table for each."""
+    marks = marks_of(runs)
+    parts = ["# Planners compared", EXPLANATION.strip(), "## All problems", _overview(runs, best, marks)]
+    for problem, planners in runs.items():
+        parts += [f"## {problem}", f"Best known: {metres(best[problem].cost, 4)} m, {best[problem].source}.",
+                  _problem_table(planners, best[problem], marks)]
+    return "\n\n".join(parts) + "\n"
+
+
+def to_document(runs: Runs, best: Mapping[str, Best]) -> dict[str, Any]:
+    """What the report computes as what JSON can hold, but for what is infinite; times in seconds, lengths in metres."""
+    marks = marks_of(runs)
+    names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
+    results = [{"problem": problem, "planner": planner, "best_known": best[problem].cost, **_figures(group, best[problem], marks)}
+               for problem, planners in runs.items() for planner, group in planners.items()]
+    return {"planners": [{"planner": name} | _overall(name, runs, best, marks) for name in names], "results": results}
+
+
+def _figures(group: list[Run], best: Best, marks: list[float]) -> dict[str, Any]:
+    """Of a planner's runs of a problem."""
+    return {"runs": len(group), "solved": sum(run.solved for run in group),
+            "time_to_first": quartiles(run.first[0] for run in group), "first_cost": quartiles(run.first[1] for run in group),
+            "final_cost": quartiles(run.cost for run in group),
+            "cost_at": {f"{mark:g}": quartiles(run.cost_at(mark) for run in group) for mark in marks},
+            "time_to_within": {f"{share:g}": median(run.time_to((1 + share) * best.cost) for run in group) for share in SHARES}}
+
+
+def _overall(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> dict[str, Any]:
+    """Of a planner's runs of all problems: means of medians, each with how many of the problems have one."""
+    groups = {problem: planners[planner] for problem, planners in runs.items() if planner in planners}
+    everything = [run for group in groups.values() for run in group]
+    ratios = {mark: [ratio(median(run.cost_at(mark) for run in group), best[problem]) for problem, group in groups.items()]
+              for mark in marks}
+    return {"runs": len(everything), "solved": sum(run.solved for run in everything), "problems": len(runs),
+            "problems_solved": sum(math.isfinite(median(run.cost for run in group)) for group in groups.values()),
+            "time_to_first": _mean(median(run.first[0] for run in group) for group in groups.values()),
+            "cost_over_best_known": {f"{mark:g}": _mean(values) for mark, values in ratios.items()}}
+
+
+def _mean(values: Iterable[float]) -> dict[str, float]:
+    """The geometric mean of those that are finite, and how many they are."""
+    finite = [value for value in values if math.isfinite(value)]
+    mean = math.prod(value ** (1 / len(finite)) for value in finite) if finite else math.inf
+    return {"geometric_mean": mean, "problems": len(finite)}
+
+
+def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> str:
+    names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
+    head = ["planner", "solved runs", "problems solved in the median", "first path [ms]",
+            *(f"cost / best known at {mark:g} s" for mark in marks)]
+    note = "The last columns are geometric means over the problems, of medians; (k/n): only k of the n problems have one."
+    return note + "\n\n" + table(head, [_overview_row(name, runs, best, marks) for name in names])
+
+
+def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> list[str]:
+    overall = _overall(planner, runs, best, marks)
+    return [planner, _share(overall), f"{overall['problems_solved']}/{overall['problems']}",
+            _shown(overall["time_to_first"], len(runs), milliseconds),
+            *(_shown(mean, len(runs), "{:.4f}".format) for mean in overall["cost_over_best_known"].values())]
+
+
+def _shown(mean: Mapping[str, float], problems: int, show: Callable[[float], str]) -> str:
+    """A mean, and of how many values it is, unless it is of one for each problem."""
+    if not mean["problems"]:
+        return "-"
+    text = show(mean["geometric_mean"])
+    return text if mean["problems"] == problems else f"{text} ({mean['problems']}/{problems})"
+
+
+def _problem_table(planners: Mapping[str, list[Run]], best: Best, marks: list[float]) -> str:
+    head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks),
+            *(f"{100 * share:g} % above best [ms]" for share in SHARES)]
+    return table(head, [_problem_row(planner, _figures(group, best, marks)) for planner, group in planners.items()])
+
+
+def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
+    *early, last = figures["cost_at"].values()
+    return [planner, _share(figures), _spread(figures["time_to_first"], milliseconds), metres(figures["first_cost"]["median"]),
+            *(metres(costs["median"]) for costs in early), _spread(last, metres),
+            *map(milliseconds, figures["time_to_within"].values())]
+
+
+def spread(values: list[float], show: Callable[[float], str]) -> str:
+    """Median and quartiles."""
+    return _spread(quartiles(values), show)
+
+
+def _spread(values: Mapping[str, float], show: Callable[[float], str]) -> str:
+    low, middle, high = map(show, values.values())
+    return middle if low == high == "-" else f"{middle} [{low}, {high}]"
+
+
+def _share(figures: Mapping[str, Any]) -> str:
+    return f"{figures['solved']}/{figures['runs']}"
+
+
+def metres(value: float, digits: int = 2) -> str:
+    """Digits after the point, or a dash."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+
+def milliseconds(seconds: float) -> str:
+    """Milliseconds with three digits, or all where there are more."""
+    if math.isinf(seconds):
+        return "-"
+    return f"{1000 * seconds:.3g}" if seconds < 0.9995 else f"{1000 * seconds:.0f}"
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
+    lines = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
+    lines.insert(1, ["---"] * len(head))
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

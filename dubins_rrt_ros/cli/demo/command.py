@@ -1,0 +1,115 @@
+"""`dubins_rrt demo`: start the node, send it a start and a goal over real topics, receive the path and draw it."""
+
+import argparse
+import contextlib
+import importlib.util
+import math
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from dubins_rrt_ros import __version__
+from dubins_rrt_ros.planning import Vehicle
+from dubins_rrt_ros.planning.maps.locate import maps_directory
+
+from ..common.flags import add_command, add_json_flag
+from ..common.output import check_drawing, check_folder, words_for, write_document
+from .process import DemoError, PlannerProcess
+
+if TYPE_CHECKING:
+    from .client import Answer
+
+START, GOAL = (1.5, 2.0, math.pi / 2), (13.5, 10.5, math.pi / 2)
+PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000,
+              "planning_time": 2.0, "seed": 1}
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(subparsers, "demo", usage="[options]", help="see the ROS node plan in the maze",
+                         description="Starts the node on the installed maze, sends it a start and a goal over real topics, "
+                                     "receives the path, draws it and stops the node.",
+                         examples=["dubins_rrt demo", "dubins_rrt demo --plot maze.svg --json demo.json"],
+                         exit_status="0 a path was received, 1 none: the reason is on standard error, 2 wrong usage, "
+                                     "130 interrupted")
+    parser.add_argument("--plot", metavar="FILE", default="demo.png",
+                        help="the picture (.png, .svg, .pdf); default demo.png")
+    add_json_flag(parser, "what was received")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Demonstrate, and return the exit status: 0 with a path."""
+    check_folder(arguments.plot, arguments.json)
+    check_drawing(arguments.plot)
+    try:
+        answer, exit_status = _demonstrate()
+    except DemoError as error:
+        print(f"dubins_rrt demo: error: {error}", file=sys.stderr)
+        return 1
+    out = words_for(arguments.json)
+    print(_report(answer), file=out)
+    _draw(arguments.plot, answer)
+    if arguments.json:
+        write_document(arguments.json, _document(answer))
+    print(f"  picture        {arguments.plot}\n  node stopped   exit status {exit_status}", file=out)
+    return 0
+
+
+def _demonstrate() -> tuple["Answer", int]:
+    """The node's answer and its exit status.
+
+    Raises:
+        DemoError: there is none.
+    """
+    if importlib.util.find_spec("rclpy") is None:
+        raise DemoError("ROS 2 is not here (no module rclpy); run: pip install '.[ros]'")
+    # A domain of its own and this machine alone: no robot nearby shall hear of it.
+    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    from .client import DemoClient
+    with _planner() as planner:
+        with DemoClient(planner.check) as client:
+            answer = client.ask(START, GOAL, PARAMETERS)
+        return answer, planner.stop()
+
+
+@contextlib.contextmanager
+def _planner() -> Iterator[PlannerProcess]:
+    # SIGTERM ends this process as Ctrl-C does, so that it leaves no node behind.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+        planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / "maze.yaml"}, log)
+        try:
+            yield planner
+        finally:
+            planner.stop()
+            signal.signal(signal.SIGTERM, before)
+
+
+def _report(answer: "Answer") -> str:
+    figures = answer.figures
+    gap = 100 * figures["gap"]
+    return (f"  path           {figures['path_length']:.2f} m, {len(answer.path)} poses on the topic plan\n"
+            f"  lower bound    {figures['lower_bound']:.2f} m, so at most {gap:.1f} % above the shortest\n"
+            f"  first path     after {1000 * figures['time_to_first']:.1f} ms\n"
+            f"  planning time  {1000 * figures['planning_time']:.1f} ms for {figures['samples']:.0f} samples, "
+            f"{figures['tree_nodes']:.0f} tree nodes")
+
+
+def _document(answer: "Answer") -> dict[str, Any]:
+    """What was received as what JSON can hold, by the names that a plan's file has."""
+    figures = dict(answer.figures)
+    return {"length": figures.pop("path_length"), **figures, "samples": int(figures["samples"]),
+            "tree_nodes": int(figures["tree_nodes"]), "poses": answer.path.tolist(), "start": START, "goal": GOAL,
+            "settings": PARAMETERS, "version": __version__}
+
+
+def _draw(file: str, answer: "Answer") -> None:
+    from ..common.plots import Drawing, draw, figures_title, path_title  # here, for matplotlib is slow to import
+    figures, vehicle = answer.figures, Vehicle(PARAMETERS["turning_radius"], PARAMETERS["robot_radius"])
+    draw(file, Drawing(answer.map, START, GOAL, vehicle, answer.tree, answer.path,
+                       path_title(PARAMETERS["planner"], figures["path_length"], figures["gap"]),
+                       figures_title(int(figures["samples"]), figures["time_to_first"], figures["planning_time"])))

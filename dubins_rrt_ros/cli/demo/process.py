@@ -1,0 +1,47 @@
+"""The installed planner as a process of its own."""
+
+import os
+import signal
+import subprocess
+from collections.abc import Mapping
+from typing import IO, Any
+
+from dubins_rrt_ros.planning.maps.locate import planner_command
+
+#: How long the node may take to stop [s].
+STOP_TIME = 10.0
+
+
+class DemoError(Exception):
+    """The demonstration failed; the message says where and what to do."""
+
+
+class PlannerProcess:
+    """The installed node in a process group of its own; what it logs is kept for the message of a failure."""
+
+    def __init__(self, parameters: Mapping[str, Any], log: IO[str]):
+        assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        self._log = log
+        self._process = subprocess.Popen([*planner_command(), "--ros-args", *assignments], stdin=subprocess.DEVNULL,
+                                         stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+
+    def check(self) -> None:
+        """Raise DemoError where the node has ended."""
+        status = self._process.poll()
+        if status is not None:
+            raise DemoError(f"the node ended with exit status {status}: {self._last_line()}")
+
+    def stop(self) -> int:
+        """End the node as Ctrl-C does, and return its exit status."""
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGINT)
+            try:
+                self._process.wait(STOP_TIME)
+            except subprocess.TimeoutExpired:
+                os.killpg(self._process.pid, signal.SIGKILL)
+        return self._process.wait()
+
+    def _last_line(self) -> str:
+        self._log.seek(0)
+        lines = [line for line in self._log.read().splitlines() if line.strip()]
+        return lines[-1] if lines else "it said nothing"

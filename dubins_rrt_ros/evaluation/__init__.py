@@ -1,0 +1,1 @@
+"""The planner measured and judged: what a robot need not install."""

@@ -1,0 +1,1 @@
+"""`dubins_rrt campaign`: random problems, every answer judged."""

@@ -1,0 +1,131 @@
+"""`dubins_rrt campaign`: random problems that try to prove the planner wrong."""
+
+import argparse
+import contextlib
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from dubins_rrt_ros import __version__
+from dubins_rrt_ros.cli.common.flags import UsageError, add_command, add_json_flag
+from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
+from dubins_rrt_ros.cli.common.progress import with_bar
+
+from .judge import Task, judged
+from .runs import results
+
+#: A problem that takes longer hangs [s]: it is planned twice at most, for a minute each.
+LIMIT = 300.0
+#: How an answer without a path ends, in the table.
+_COLUMNS = {"path": ("NONE",), "no path": ("NO_VALID_PATH",), "occupied": ("START_OCCUPIED", "GOAL_OCCUPIED"),
+            "outside": ("START_OUTSIDE_MAP", "GOAL_OUTSIDE_MAP"), "time limit": ("TIMEOUT",)}
+#: What is known of the vehicle, in the table.
+_KNOWN = {True: ", passes", False: ", does not pass", None: ""}
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subparsers, "campaign", usage="[options]", help="try to prove the planner wrong with random problems",
+        description="Plans random problems - grids of many resolutions, polygons, mazes, gaps that just pass and that just fail, "
+                    "starts and goals that touch obstacles, discs and polygons as vehicles, all planners and samplers - and "
+                    "judges each answer by the audit: the path, all edges of the tree, and what the status claims.",
+        notes="A number and a seed always give the same problem. Whatever is wrong is told with the command that repeats it. "
+              "Where it is interrupted, what was done by then is reported.",
+        examples=["dubins_rrt campaign --problems 20", "dubins_rrt campaign --problems 10000 --seed 5 --jobs 2 --json -"],
+        exit_status="0 all is right, 1 something is not, 2 wrong usage, 130 interrupted")
+    parser.add_argument("--problems", metavar="N", type=int, default=1000, help="how many; default 1000")
+    parser.add_argument("--seed", metavar="S", type=int, default=0, help="of the problems; default 0")
+    parser.add_argument("--first", metavar="K", type=int, default=0, help="the number of the first problem; default 0")
+    parser.add_argument("--jobs", metavar="J", type=int, default=1,
+                        help=f"work in J processes, where crashes and problems that take more than {LIMIT:g} s are told too; "
+                             "default 1, this process")
+    parser.add_argument("--out", metavar="FILE", help="write a line of JSON for each problem")
+    add_json_flag(parser, "the counts, and all disagreements,")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan and judge, report, and return the exit status."""
+    for name, least in (("problems", 1), ("seed", 0), ("first", 0), ("jobs", 1)):
+        if getattr(arguments, name) < least:
+            raise UsageError(f"--{name} is {getattr(arguments, name)}; give {least} or more")
+    check_folder(arguments.out, arguments.json)
+    tasks = [Task(arguments.seed, arguments.first + i) for i in range(arguments.problems)]
+    lines, begin = [], time.perf_counter()
+    try:
+        lines.extend(_lines(tasks, arguments.jobs, arguments.out))
+    except KeyboardInterrupt:
+        _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
+        raise
+    _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
+    return 1 if any(line["findings"] for line in lines) else 0
+
+
+def _lines(tasks: list[Task], jobs: int, file: str | None) -> Iterator[dict[str, Any]]:
+    """The lines of all tasks, each written to the file as soon as it is there."""
+    running = map(judged, tasks) if jobs == 1 else results(judged, tasks, jobs, LIMIT, _lost)
+    with contextlib.ExitStack() as stack:
+        out = stack.enter_context(Path(file).open("w", encoding="utf-8")) if file else None
+        for line in with_bar(running, len(tasks), " problems"):
+            if out:
+                out.write(json.dumps(line) + "\n")
+                out.flush()
+            yield line
+
+
+def _lost(task: Task, what: str) -> dict[str, Any]:
+    """The line of a problem that no answer came to."""
+    return {"seed": task.seed, "number": task.number, "kind": "lost", "status": "", "edges": 0, "curves": 0, "paths": 0,
+            "seconds": LIMIT, "findings": [what]}
+
+
+def _tell(counts: dict[str, Any], json_file: str | None) -> None:
+    if json_file:
+        write_document(json_file, counts)
+    print(_report(counts), file=words_for(json_file))
+
+
+def _counts(lines: list[dict[str, Any]], seed: int, seconds: float) -> dict[str, Any]:
+    """What the campaign came to: how many problems of each kind ended how, and each disagreement with what repeats it."""
+    labels = [line["kind"] + _KNOWN[line.get("fits")] for line in lines]
+    kinds = {label: dict(Counter(line["status"] for line, its in zip(lines, labels, strict=True) if its == label))
+             for label in sorted(set(labels))}
+    wrong = sorted((line for line in lines if line["findings"]), key=lambda line: line["number"])
+    disagreements = [{name: line[name] for name in ("number", "kind", "findings")} | {"repeat": _repeat(line)} for line in wrong]
+    return {"problems": len(lines), "seed": seed, "seconds": seconds,
+            **{name: sum(line[name] for line in lines) for name in ("paths", "edges", "curves")},
+            "kinds": kinds, "disagreements": disagreements, "version": __version__}
+
+
+def _repeat(line: dict[str, Any]) -> str:
+    """The command that repeats a problem."""
+    return f"dubins_rrt campaign --seed {line['seed']} --first {line['number']} --problems 1"
+
+
+def _report(counts: dict[str, Any]) -> str:
+    """The counts in words."""
+    problems, wrong = counts["problems"], counts["disagreements"]
+    parts = [*_table(counts["kinds"]),
+             f"{problems} problem{'s' * (problems != 1)} of seed {counts['seed']} in {counts['seconds']:.0f} s: "
+             f"{counts['paths']} paths, {counts['edges']} edges of trees and {counts['curves']} other curves judged; "
+             f"{len(wrong)} disagreement{'s' * (len(wrong) != 1)}"]
+    for each in wrong:
+        parts += [f"problem {each['number']}, {each['kind']}; repeat it with `{each['repeat']}`:",
+                  *(f"  {finding}" for finding in each["findings"])]
+    return "\n".join(parts)
+
+
+def _table(kinds: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
+    """How many problems of each kind ended how."""
+    yield _row("", "problems", *_COLUMNS, "other")
+    for kind, ends in (kinds | {"all": sum(map(Counter, kinds.values()), Counter())}).items():
+        counts = [sum(ends.get(name, 0) for name in names) for names in _COLUMNS.values()]
+        yield _row(kind, sum(ends.values()), *counts, sum(ends.values()) - sum(counts))
+
+
+def _row(first: str, *others: Any) -> str:
+    return f"{first:<20}" + "".join(f"{other:>11}" for other in others)

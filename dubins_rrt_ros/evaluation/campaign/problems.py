@@ -1,0 +1,280 @@
+"""Random problems for `dubins_rrt campaign`, of many kinds; a number and a seed always give the same one."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from dubins_rrt_ros.planning import FREE, OCCUPIED, UNKNOWN, GridMap, Map, Pose, Problem, Settings, Vehicle
+from dubins_rrt_ros.planning.audit.edges import clearances, pose_gaps
+from dubins_rrt_ros.planning.maps.model import FREE_UP_TO
+
+from .maps import MAPS, log_uniform, placed, random_origin
+
+#: What a vehicle that just passes has to spare on either side, and what one that just fails lacks on both together [m].
+TO_SPARE, LACKING = 0.0011, 2e-6
+#: How far poses are from touching an obstacle [m].
+GAPS = 0.0, 1e-7, 1e-4, 4e-4, 6e-4, 0.001, 0.0011
+#: So many poses are drawn at a time, among which free ones are looked for.
+POSES = 40
+#: How many samples most problems are given, and a few.
+SAMPLES, MANY_SAMPLES = (20, 400), 3000
+#: The time limit of most problems, which is never reached, and of some, which is [s].
+AMPLE_TIME, SHORT_TIME = 60.0, (0.001, 0.05)
+#: Footprints of reach 1 or a little less: x ahead of the reference point and y beside it.
+OUTLINES = {
+    "centred": [[1, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]],
+    "car": [[1, 0.25], [-0.25, 0.25], [-0.25, -0.25], [1, -0.25]],
+    "thin": [[1, 0.01], [-0.5, 0.01], [-0.5, -0.01], [1, -0.01]],
+    "bow": [[1, 0], [0.7, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.7, -0.3]],
+    "L": [[0.7, 0.7], [0.2, 0.7], [0.2, 0.2], [-0.7, 0.2], [-0.7, -0.3], [0.7, -0.3]],
+    "fork": [[1, 0.4], [-0.2, 0.4], [-0.2, -0.4], [1, -0.4], [1, -0.3], [0.25, -0.3], [0.25, 0.3], [1, 0.3]],
+    "star": [[1, 0], [0.2, 0.2], [0, 1], [-0.2, 0.2], [-1, 0], [-0.2, -0.2], [0, -1], [0.2, -0.2]],
+}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A problem, how to plan it, and what is known of it.
+
+    Attributes:
+        kind: how it was made.
+        fits: True where the vehicle can drive the shortest curve from start to goal, False where there is no path; None where
+            nothing is known.
+    """
+
+    kind: str
+    problem: Problem
+    settings: Settings
+    fits: bool | None = None
+
+
+def random_trial(seed: int, number: int) -> Trial:
+    """The problem of this number."""
+    rng = np.random.default_rng((seed, number))
+    kind = str(rng.choice(list(KINDS), p=list(SHARES)))
+    return replace(KINDS[kind](rng), kind=kind)
+
+
+def random_settings(rng: np.random.Generator, scale: float) -> Settings:
+    """Of all planners and samplers, mostly with few samples; where the longest edge is limited, to about `scale` [m]."""
+    hurried = rng.random() < 0.03
+    samples = 100_000 if hurried else MANY_SAMPLES if rng.random() < 0.02 else int(log_uniform(rng, *SAMPLES))
+    return Settings(
+        planner=str(rng.choice(["rrt", "rrt_star"])), samples=samples, seed=int(rng.integers(2**31)),
+        planning_time=log_uniform(rng, *SHORT_TIME) if hurried else AMPLE_TIME,
+        step_size=scale * log_uniform(rng, 0.3, 10.0) if rng.random() < 0.4 else 0.0,
+        goal_bias=float(rng.choice([0.0, 0.05, 0.3, 1.0], p=[0.1, 0.5, 0.3, 0.1])),
+        heading_sampling=str(rng.choice(["uniform", "goal", "field", "mixed"])),
+        informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6))
+
+
+def _on_map(make: Callable[[np.random.Generator], Map]) -> Callable[[np.random.Generator], Trial]:
+    """A maker of problems on such maps, between poses that are free if there are such."""
+
+    def make_trial(rng: np.random.Generator) -> Trial:
+        map = make(rng)
+        asked = Problem(map, Vehicle(), _some_pose(map, rng), _some_pose(map, rng), allow_unknown=bool(rng.random() < 0.3))
+        room = max(float(clearances(_poses(map, rng)[:, :2], asked).max()), 1e-3)
+        asked = replace(asked, vehicle=_vehicle(rng, room), **_tolerances(rng, room))
+        poses = _poses(map, rng)
+        free = np.flatnonzero(pose_gaps(poses, asked) > 0)
+        start, goal = poses[rng.choice(free if len(free) > 1 else POSES, 2, replace=False)].tolist()
+        scale = max(asked.vehicle.turning_radius, _side(map) / 50)
+        return Trial("", replace(asked, start=start, goal=goal), random_settings(rng, scale))
+
+    return make_trial
+
+
+def _anywhere(rng: np.random.Generator) -> Trial:
+    """Between poses in obstacles, and outside the map, too."""
+    trial = _any_map(rng)
+    poses = _poses(trial.problem.map, rng, beyond=0.3)
+    poses[:, 2] += math.tau * rng.integers(-1000, 1000, POSES)
+    ends = {name: poses[i].tolist() for i, name in enumerate(("start", "goal")) if rng.random() < 0.7}
+    return replace(trial, problem=replace(trial.problem, **ends))
+
+
+def _touching(rng: np.random.Generator) -> Trial:
+    """Between poses where the vehicle nearly touches, or just touches, an obstacle."""
+    trial = _any_map(rng)
+    problem = trial.problem
+    for name in ("start", "goal"):
+        if rng.random() < 0.7:
+            problem = replace(problem, **{name: _moved_up(problem, getattr(problem, name), float(rng.choice(GAPS)), rng)})
+    return replace(trial, problem=problem)
+
+
+def _near(rng: np.random.Generator) -> Trial:
+    """To a goal beside the start, or to the start itself."""
+    trial = _any_map(rng)
+    x, y, theta = trial.problem.start
+    away = log_uniform(rng, 1e-10, 1.0) * trial.problem.vehicle.turning_radius if rng.random() < 0.9 else 0.0
+    bearing, turn = rng.uniform(-math.pi, math.pi), rng.choice([0.0, 1e-9, math.tau, log_uniform(rng, 1e-9, 1.0)])
+    goal = x + away * math.cos(bearing), y + away * math.sin(bearing), theta + turn
+    return replace(trial, problem=replace(trial.problem, goal=goal))
+
+
+def _gap(rng: np.random.Generator) -> Trial:
+    """Straight through a gap between two walls, the only way, that is just wide enough or just not."""
+    fits, width = bool(rng.random() < 0.5), log_uniform(rng, 0.05, 5.0)
+    half = width / 2 - TO_SPARE if fits else width / 2 + LACKING / 2
+    vehicle, reach = _of_half_width(rng, half)
+    kind, origin = rng.choice(["grid", "polygons"]), random_origin(rng)
+    cells = int(rng.integers(1, 5))
+    thick = log_uniform(rng, 0.001, 2.0) * width if kind == "polygons" else int(rng.integers(1, 6)) * width / cells
+    away = thick / 2 + reach * rng.uniform(1.01, 2)
+    sides = 2 * (away + 1.2 * reach), 2 * rng.uniform(1.2, 3) * reach + width
+    if kind == "grid":
+        map = _gap_grid(width, cells, thick, sides, origin, wall=int(rng.choice([OCCUPIED, UNKNOWN, FREE_UP_TO + 1])))
+    else:
+        map = _gap_polygons(width, thick, sides, origin)
+    problem = Problem(map, vehicle, _at(origin, -away, 0.0, 0.0), _at(origin, away, 0.0, 0.0))
+    return Trial("", problem, random_settings(rng, reach), fits)
+
+
+def _gap_polygons(width: float, thick: float, sides: tuple[float, float], origin: Pose) -> Map:
+    x, y = sides[0] / 2, sides[1] / 2
+    walls = [shapely.box(-thick / 2, width / 2, thick / 2, y + 1), shapely.box(-thick / 2, -y - 1, thick / 2, -width / 2)]
+    return placed(shapely.box(-x, -y, x, y) - shapely.union_all(walls), origin)
+
+
+def _gap_grid(width: float, cells: int, thick: float, sides: tuple[float, float], origin: Pose, wall: int) -> Map:
+    """So many cells are as wide as the gap; those of the walls hold the value `wall`."""
+    resolution = width / cells
+    through = round(thick / resolution)
+    ahead, beside = math.ceil(sides[0] / 2 / resolution), math.ceil(sides[1] / 2 / resolution)
+    data = np.zeros((2 * beside + cells, 2 * ahead + through), np.int8)
+    data[:, ahead:ahead + through] = wall
+    data[beside:beside + cells, ahead:ahead + through] = FREE
+    corner = _at(origin, -(ahead + through / 2) * resolution, -(beside + cells / 2) * resolution, 0.0)
+    return GridMap(data, resolution, corner)
+
+
+def _corner(rng: np.random.Generator) -> Trial:
+    """Round a bend past a post, which the outer corner or the inner side just clears, or just does not."""
+    fits, outer, side = bool(rng.random() < 0.5), bool(rng.random() < 0.5), int(rng.choice([-1, 1]))
+    half = log_uniform(rng, 0.05, 2.0)
+    vehicle, reach = _of_half_width(rng, half, chamfered=False)
+    radius = half + reach * log_uniform(rng, 0.3, 5.0)
+    vehicle = replace(vehicle, turning_radius=radius)
+    farthest = max((abs(x) for x, _ in vehicle.outline), default=0.0)
+    gap = TO_SPARE if fits else -LACKING / 2
+    away = math.hypot(farthest, radius + half) + gap if outer else radius - half - gap
+    bearing, half_turn = rng.uniform(-math.pi, math.pi), rng.uniform(0.3, 1.4)
+    origin = random_origin(rng)
+    post = away * math.cos(bearing), away * math.sin(bearing)
+    map = (_post_grid if rng.random() < 0.5 else _post_polygons)(rng, post, bearing if outer else bearing + math.pi,
+                                                                 3 * radius + 3 * reach, origin)
+    # The centre of the turn is (0, 0) before everything is moved to the origin.
+    angles = bearing - side * half_turn, bearing + side * half_turn
+    start, goal = (_at(origin, radius * math.cos(a), radius * math.sin(a), a + side * math.pi / 2) for a in angles)
+    return Trial("", Problem(map, vehicle, start, goal), random_settings(rng, reach), True if fits else None)
+
+
+def _post_polygons(rng: np.random.Generator, tip: tuple[float, float], bearing: float, reach: float, origin: Pose) -> Map:
+    """A pointed post whose tip is there, and which lies beyond in that direction."""
+    long = reach * log_uniform(rng, 0.001, 0.01)
+    ahead = np.array([math.cos(bearing), math.sin(bearing)])
+    beside = rng.uniform(0.05, 0.5) * np.array([-ahead[1], ahead[0]])
+    post = shapely.Polygon([tip, tip + long * (ahead + beside), tip + long * (ahead - beside)])
+    return placed(shapely.box(-reach, -reach, reach, reach) - post, origin)
+
+
+def _post_grid(rng: np.random.Generator, tip: tuple[float, float], bearing: float, reach: float, origin: Pose) -> Map:
+    """A single cell whose corner is there, and which lies beyond in that direction."""
+    cells = int(rng.integers(200, 400))
+    resolution = 2 * reach / cells
+    data = np.zeros((cells, cells), np.int8)
+    data[cells // 2, cells // 2] = OCCUPIED
+    x, y, yaw = _at(origin, *tip, bearing - math.pi / 4)
+    back = cells // 2 * resolution
+    return GridMap(data, resolution, _at((x, y, yaw), -back, -back, 0.0))
+
+
+def _of_half_width(rng: np.random.Generator, half: float, chamfered: bool = True) -> tuple[Vehicle, float]:
+    """A disc, or a polygon no narrower in any direction, so wide to either side [m], and how far it reaches."""
+    turning_radius = max(half * log_uniform(rng, 0.5, 5.0), 0.001)
+    if rng.random() < 0.4:
+        return Vehicle(turning_radius, half), half
+    front, back = half * (1 + rng.uniform(0.5, 4.0)), half * (1 + rng.uniform(0.01, 2.0))
+    cut = half * 0.2 if chamfered and rng.random() < 0.5 else 0.0
+    nose = [[front - cut, half], [front, half - cut], [front, cut - half], [front - cut, -half]] if cut else [
+        [front, half], [front, -half]]
+    vehicle = Vehicle(turning_radius, footprint=_text([*nose, [-back, -half], [-back, half]]))
+    return vehicle, vehicle.robot_radius
+
+
+def _vehicle(rng: np.random.Generator, room: float) -> Vehicle:
+    """One that has a chance of moving on a map, whose largest clearance is about `room` [m]."""
+    turning_radius = max(room * log_uniform(rng, 0.05, 3.0), 0.001)
+    kind = rng.choice(["disc", "point", "polygon", "random polygon"], p=[0.35, 0.1, 0.4, 0.15])
+    if kind in ("disc", "point"):
+        return Vehicle(turning_radius, room * log_uniform(rng, 0.02, 0.9) if kind == "disc" else 0.0)
+    if kind == "polygon":
+        corners = np.array(OUTLINES[str(rng.choice(list(OUTLINES)))])
+    else:  # around (0, 0) with no angle of half a turn, so that this is inside
+        bearings = np.sort(rng.uniform(0, math.tau, 2)) + np.array([[0.0], [2.1], [4.2]]) + rng.uniform(0, math.tau)
+        bearings = np.sort(np.unique(np.round(bearings.ravel() % math.tau, 3)))
+        corners = np.column_stack([np.cos(bearings), np.sin(bearings)]) * rng.uniform(0.15, 1, (len(bearings), 1))
+    return Vehicle(turning_radius, footprint=_text((room * log_uniform(rng, 0.05, 1.8) * corners).tolist()))
+
+
+def _tolerances(rng: np.random.Generator, room: float) -> dict[str, Any]:
+    """The goal's tolerances, of which there are none at most times."""
+    if rng.random() < 0.7:
+        return {}
+    return {"goal_tolerance_xy": float(rng.choice([0.0, room * log_uniform(rng, 0.01, 1.0)])),
+            "goal_tolerance_yaw": float(rng.choice([0.0, rng.uniform(0, math.pi)])), "any_goal_heading": bool(rng.random() < 0.3)}
+
+
+def _any_map(rng: np.random.Generator) -> Trial:
+    return _on_map(MAPS[str(rng.choice(list(MAPS)))])(rng)
+
+
+def _side(map: Map) -> float:
+    return float(np.ptp(map.corners(), axis=0).max())
+
+
+def _some_pose(map: Map, rng: np.random.Generator) -> Pose:
+    return tuple(_poses(map, rng)[0].tolist())
+
+
+def _poses(map: Map, rng: np.random.Generator, beyond: float = 0.0) -> np.ndarray:
+    """(POSES, 3) poses on a map, or outside too by a share of its sides."""
+    corners = map.corners()
+    shares = rng.uniform(-beyond, 1 + beyond, (POSES, 2))
+    return np.column_stack([corners[0] + shares @ (corners[[1, 3]] - corners[0]), rng.uniform(-math.pi, math.pi, POSES)])
+
+
+def _moved_up(problem: Problem, pose: Pose, gap: float, rng: np.random.Generator) -> Pose:
+    """The pose moved in some direction to where the vehicle has just this gap or hardly more."""
+    bearing = rng.uniform(-math.pi, math.pi)
+
+    def moved(by: float) -> Pose:
+        return pose[0] + by * math.cos(bearing), pose[1] + by * math.sin(bearing), pose[2]
+
+    near, far = 0.0, 2 * _side(problem.map)
+    for _ in range(80):
+        middle = (near + far) / 2
+        near, far = (middle, far) if pose_gaps(np.array([moved(middle)]), problem)[0] > gap else (near, middle)
+    return moved(near)
+
+
+def _at(origin: Pose, x: float, y: float, theta: float) -> Pose:
+    """A pose in the frame of another."""
+    c, s = math.cos(origin[2]), math.sin(origin[2])
+    return origin[0] + c * x - s * y, origin[1] + s * x + c * y, origin[2] + theta
+
+
+def _text(corners: list[list[float]]) -> str:
+    return str([[float(x), float(y)] for x, y in corners])
+
+
+#: The makers of problems by their kinds, and how often each is asked.
+KINDS = {**{name: _on_map(make) for name, make in MAPS.items()}, "anywhere": _anywhere, "touching": _touching, "near": _near,
+          "gap": _gap, "corner": _corner}
+SHARES = [0.5 / len(MAPS)] * len(MAPS) + [0.06, 0.12, 0.06, 0.16, 0.1]

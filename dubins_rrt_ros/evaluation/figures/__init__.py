@@ -1,0 +1,1 @@
+"""`dubins_rrt figures`: the figures of the documentation."""

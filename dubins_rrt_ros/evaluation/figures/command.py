@@ -1,0 +1,65 @@
+"""`dubins_rrt figures`: draw the figures of the documentation."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dubins_rrt_ros.cli.common.flags import add_command, add_json_flag
+from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
+from dubins_rrt_ros.cli.common.progress import with_bar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLDER = "docs/figures"
+#: The formats, and their pixels to the inch. In .svg only trees and fields have any: enough for a page, in half the bytes.
+FORMATS = {".svg": 110, ".png": 160}
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subparsers, "figures", usage="[options]", help="draw the figures of the documentation",
+        description="Draws every figure of docs/ as .svg and .png: what they show is computed by the planner itself, so they "
+                    "are right for this version.",
+        notes="Drawn again by the same versions of this package and matplotlib, the files are the same to the byte.",
+        examples=["dubins_rrt figures --out figures"], exit_status="0 done, 2 wrong usage, 130 interrupted")
+    parser.add_argument("--out", metavar="DIR", default=FOLDER, help=f"where to write; default {FOLDER}")
+    add_json_flag(parser, "the files' names")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw, say what was written, and return the exit status."""
+    check_folder(arguments.json)
+    folder, figures = Path(arguments.out), all_figures()
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [file for written in with_bar(_written(figures, folder), len(figures), " figures") for file in written]
+    if arguments.json:
+        write_document(arguments.json, {"files": files})
+    print(f"{folder}: {len(figures)} figures, each as {' and '.join(FORMATS)}", file=words_for(arguments.json))
+    return 0
+
+
+def all_figures() -> "dict[str, Callable[[], Figure]]":
+    """What draws each figure, by the name of its files without their ending."""
+    from . import geometry as figures_geometry  # here, for matplotlib takes long to import
+    from . import search as figures_search
+    return figures_geometry.FIGURES | figures_search.FIGURES
+
+
+def _written(figures: "dict[str, Callable[[], Figure]]", folder: Path) -> Iterator[list[str]]:
+    """The names of each figure's files as soon as they are written."""
+    for name, drawn in figures.items():
+        yield save(drawn(), folder / name)
+
+
+def save(figure: "Figure", path: Path) -> list[str]:
+    """Write a figure in all formats, the same one always as the same bytes, and return the names of its files."""
+    from matplotlib import rc_context
+    files = {str(path.with_suffix(ending)): dpi for ending, dpi in FORMATS.items()}
+    with rc_context({"svg.hashsalt": "dubins_rrt_ros"}):  # in place of random names in the file
+        for file, dpi in files.items():
+            figure.savefig(file, dpi=dpi, metadata={"Date": None} if file.endswith(".svg") else None)
+    return list(files)

@@ -1,0 +1,210 @@
+"""Figures of docs/dubins_curves.md and docs/collisions.md, drawn of what the planner's own code computes."""
+
+import math
+from collections.abc import Callable
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Polygon
+from numpy.typing import ArrayLike
+
+from dubins_rrt_ros.cli.common.plots import CULPRIT, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
+from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle
+from dubins_rrt_ros.planning.collision.clearance import MARGIN
+from dubins_rrt_ros.planning.collision.footprint import cover
+from dubins_rrt_ros.planning.curves.dubins import candidates, shortest
+
+#: The width of a figure [inch], and the sizes of its letters.
+WIDTH, TITLE, LABEL = 7.2, 13, 12
+#: The poses of a drawn curve are this far apart [m]: 2 mm off it at most.
+SPACING = 0.1
+#: Poses so close that all six words have a curve, as the two with three turns have for close poses only; the radius is 1 m.
+FROM, TO = (0.0, 0.0, math.radians(30)), (3.0, 1.0, math.radians(180))
+TURN = {"L": 1, "S": 0, "R": -1}
+#: A room with obstacles, and a curve of a disc that passes between them [m].
+ROOM = PolygonMap(shapely.difference(shapely.box(0, 0, 12, 6), shapely.union_all([shapely.Polygon(corners) for corners in (
+    [(3.4, 6.0), (3.2, 3.5), (4.6, 2.9), (5.6, 4.2), (5.2, 6.0)], [(5.2, 0.0), (5.5, 1.9), (6.9, 2.4), (7.4, 0.0)],
+    [(8.9, 2.5), (9.9, 1.2), (10.5, 2.0), (9.8, 3.0)])])))
+WALK, DISC = shortest((1.0, 2.4, -1.1), (11.1, 3.4, -1.2), 1.5), Vehicle(turning_radius=1.5, robot_radius=0.4)
+#: A car whose rear axle is 0.9 m from its rear; by how much it is made wider, how tightly it turns and how far it drives [m].
+CAR, WIDER, TIGHT, STRAIGHT = ((3.6, 0.9), (-0.9, 0.9), (-0.9, -0.9), (3.6, -0.9)), 0.3, 5.0, 1.5
+
+
+class Look(NamedTuple):
+    """A look at the clearance on the way along a curve.
+
+    Attributes:
+        point: (x, y) [m].
+        clearance: what was found: the exact one [m], or where that is enough a lower bound of it.
+        is_exact: whether the raster's bound was not enough.
+    """
+
+    point: tuple[float, float]
+    clearance: float
+    is_exact: bool
+
+
+def six_words() -> Figure:
+    """The curve of each word between the same two poses."""
+    curves = candidates(FROM, TO, 1.0)
+    best = min(curves.values(), key=lambda curve: curve.length)
+    figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
+    for axes, (word, curve) in zip(figure.subplots(2, 3, sharex=True, sharey=True).flat, curves.items(), strict=True):
+        is_best = curve is best
+        axes.set_title(f"{word}  {curve.length:.2f} m" + (", shortest" if is_best else ""), fontsize=TITLE,
+                       weight="bold" if is_best else "normal", color=PATH if is_best else OBSTACLE)
+        _draw_word(axes, curve, PATH if is_best else OBSTACLE)
+        axes.set(aspect="equal")
+        axes.axis("off")
+    ends = (Line2D([], [], color=colour, linewidth=3, label=name) for name, colour in (("start", START), ("goal", GOAL)))
+    _add_legend(figure, [*ends, Line2D([], [], color=UNKNOWN, linestyle="--", label="circle of the turning radius")])
+    return figure
+
+
+def _add_legend(figure: Figure, handles: list[Artist]) -> None:
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=LABEL, frameon=False,
+                  handletextpad=0.4, columnspacing=1.2)
+
+
+def _draw_word(axes: Axes, curve: DubinsCurve, colour: str) -> None:
+    """A curve, the circles of its turns, and their letters."""
+    for turn, begin, length in zip(curve.word, accumulate(curve.lengths, initial=0.0), curve.lengths, strict=False):
+        side = TURN[turn]
+        if side:
+            axes.add_patch(Circle(_aside(curve.pose_at(begin), side * curve.radius), curve.radius, fill=False, color=UNKNOWN,
+                                  linewidth=1, linestyle="--"))
+        axes.text(*_aside(curve.pose_at(begin + length / 2), -0.3 * (side or 1)), turn, fontsize=LABEL, weight="bold",
+                  color=colour, ha="center", va="center")
+    poses = curve.poses(SPACING)
+    axes.plot(poses[:, 0], poses[:, 1], color=colour, linewidth=2.6, solid_capstyle="round")
+    joints = np.array([curve.pose_at(s) for s in accumulate(curve.lengths[:2])])
+    axes.plot(joints[:, 0], joints[:, 1], "o", color=colour, markerfacecolor=FREE, markersize=5)
+    # The one ends where the curve begins, so that neither hides it.
+    _draw_arrow(axes, _ahead(curve.start, -0.9), curve.start[:2], START)
+    _draw_arrow(axes, curve.end[:2], _ahead(curve.end, 0.9), GOAL)
+
+
+def _aside(pose: Pose, distance: float) -> tuple[float, float]:
+    """The point at a distance to the left of a pose."""
+    x, y, theta = pose
+    return x - distance * math.sin(theta), y + distance * math.cos(theta)
+
+
+def _ahead(pose: Pose, distance: float) -> tuple[float, float]:
+    """The point at a distance ahead of a pose."""
+    x, y, theta = pose
+    return x + distance * math.cos(theta), y + distance * math.sin(theta)
+
+
+def _draw_arrow(axes: Axes, tail: tuple[float, float], tip: tuple[float, float], colour: str) -> None:
+    axes.annotate("", tip, tail, zorder=5, arrowprops={"color": colour, "width": 2, "headwidth": 8, "headlength": 8, "shrink": 0})
+
+
+def collision_walk() -> Figure:
+    """The walk by clearance along a curve."""
+    looks = walk(ClearanceField.of(ROOM), WALK, DISC.robot_radius)
+    exact = sum(look.is_exact for look in looks)
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    frame(axes, ROOM)
+    axes.set_title(f"{len(looks)} looks find {WALK.length:.1f} m of curve free; {exact} need the exact distance", fontsize=TITLE,
+                   weight="bold", loc="left")
+    for is_exact, colour in ((False, GOAL), (True, CULPRIT)):
+        _draw_looks(axes, [look for look in looks if look.is_exact == is_exact], colour)
+    draw_on(axes, Drawing(ROOM, WALK.start, WALK.end, DISC, np.empty((0, 2, 2)), WALK.poses(SPACING), "", ""))
+    discs = {"marker": "o", "markersize": 13, "linestyle": "none"}
+    _add_legend(figure, [Line2D([], [], color=PATH, linewidth=2.2, label="curve"),
+                         Patch(facecolor=PATH, alpha=0.3, label="vehicle"),
+                         Line2D([], [], color=GOAL, markerfacecolor=TREE, **discs, label="bound from the raster"),
+                         Line2D([], [], color=CULPRIT, markerfacecolor=FREE, **discs, label="exact distance")])
+    return figure
+
+
+def _draw_looks(axes: Axes, looks: list[Look], colour: str) -> None:
+    """The discs that hold no obstacle, under the path, and their middles on it."""
+    for look in looks:
+        _draw_disc(axes, look.point, look.clearance, colour)
+    x, y = np.transpose([look.point for look in looks])
+    axes.plot(x, y, "o", color=colour, markeredgecolor=FREE, markersize=6, zorder=5)
+
+
+def _draw_disc(axes: Axes, middle: tuple[float, float], radius: float, colour: str) -> None:
+    axes.add_patch(Circle(middle, radius, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1.2, zorder=2))
+
+
+def walk(field: ClearanceField, curve: DubinsCurve, need: float) -> list[Look]:
+    """Where the walk of `planning/_kernels/clearance.py` looks along a curve that shall keep the clearance `need` [m].
+
+    It ends with a look that finds less than that and the margin, or with the end of the curve.
+    """
+    looks, s = [], 0.0
+    while s <= curve.length:
+        looks.append(_look(field, curve.pose_at(s), need))
+        if looks[-1].clearance < need + MARGIN:
+            return looks
+        s += looks[-1].clearance - need + MARGIN / 2
+    return [*looks, _look(field, curve.end, need)]
+
+
+def _look(field: ClearanceField, pose: Pose, need: float) -> Look:
+    point = np.array(pose[:2])
+    bound = float(np.asarray(field.kernel.field)[field.cells(point)])
+    is_exact = bound < need + MARGIN + field.kernel.resolution
+    return Look(pose[:2], float(field.at(point)) if is_exact else bound, is_exact)
+
+
+def footprint_cover() -> Figure:
+    """How a car is held against the obstacles: roughly and exactly, in a turn and straight on."""
+    figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey=True).flat
+    for axes, draw in zip(panels, (_draw_discs, _draw_wider, _draw_turn, _draw_sweep), strict=True):
+        axes.set_title(draw(axes), fontsize=LABEL, weight="bold", loc="left")
+        axes.set(aspect="equal", xlim=(-1.5, 5.3), ylim=(-1.5, 1.7))
+        axes.axis("off")
+        _draw_shape(axes, CAR, PATH)
+        axes.plot(0, 0, "o", color=PATH, markersize=6, zorder=4)
+    return figure
+
+
+def _draw_discs(axes: Axes) -> str:
+    """The discs that cover the car."""
+    found = cover(CAR)
+    for x, y, radius, _ in found.discs:
+        _draw_disc(axes, (x, y), radius, GOAL)
+    return f"{len(found.discs)} discs, {100 * found.excess:.0f} cm beyond it"
+
+
+def _draw_wider(axes: Axes) -> str:
+    """The car made wider."""
+    corners = cover(CAR).corners
+    _draw_shape(axes, corners[:, :2] + WIDER * corners[:, 2:], GOAL)
+    return f"{100 * WIDER:.0f} cm wider, corners cut off"
+
+
+def _draw_turn(axes: Axes) -> str:
+    """How far its corners move per metre of the reference point."""
+    moves = [(1 - y / TIGHT, x / TIGHT) for x, y in CAR]
+    for (x, y), (along, across) in zip(CAR, moves, strict=True):
+        _draw_arrow(axes, (x, y), (x + along, y + across), GOAL)
+    return f"turning: at most {max(math.hypot(*move) for move in moves):.2f} m per metre"
+
+
+def _draw_sweep(axes: Axes) -> str:
+    """What it covers on a straight arc."""
+    last = [(x + STRAIGHT, y) for x, y in CAR]
+    _draw_shape(axes, shapely.get_coordinates(shapely.MultiPoint([*CAR, *last]).convex_hull), GOAL)
+    return "straight on: all at once"
+
+
+def _draw_shape(axes: Axes, corners: ArrayLike, colour: str) -> None:
+    axes.add_patch(Polygon(corners, facecolor=to_rgba(colour, 0.2), edgecolor=colour, linewidth=1.8, zorder=3))
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (six_words, collision_walk, footprint_cover)}

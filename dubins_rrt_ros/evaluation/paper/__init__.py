@@ -1,0 +1,1 @@
+"""`dubins_rrt paper`: the paper's figures and table, measured here."""

@@ -1,0 +1,79 @@
+"""`dubins_rrt paper`: measure again what the paper measured, and answer its open question."""
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+from dubins_rrt_ros.cli.common.flags import UsageError, add_command, add_json_flag
+from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, write_document
+from dubins_rrt_ros.cli.common.progress import with_bar
+from dubins_rrt_ros.planning import kernels_compiled
+
+from .runs import Measured, all_runs, outcomes
+
+SEEDS = 30
+REPORT, LINES = "report.md", "runs.jsonl"
+
+
+def add_to(subparsers: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subparsers, "paper", usage="[options]", help="measure again what the paper measured",
+        description="Runs what the paper ran - RRT and RRT* in block, maze and forest, and its table of the maze - over many "
+                    "seeds, and answers its open question: what if steps have no limit, and headings point towards the goal? "
+                    f"Writes {REPORT} with tables and figures (.png and .svg), and {LINES}, a line of JSON for each run.",
+        notes="Samples end the runs, not the time, so that the same seeds give the same lengths. The first example takes some "
+              "seconds; then open quick/report.md.",
+        examples=["dubins_rrt paper --seeds 2 --out quick", "dubins_rrt paper --json answer.json"],
+        exit_status="0 done, 2 wrong usage, 130 interrupted")
+    parser.add_argument("--out", metavar="DIR", default="paper_results", help="where to write; default paper_results")
+    parser.add_argument("--seeds", metavar="N", type=int, default=SEEDS, help=f"use the seeds 0 to N-1; default {SEEDS}")
+    parser.add_argument("--jobs", metavar="J", type=int, default=os.cpu_count() or 1,
+                        help="run in J processes; default as many as there are cores")
+    add_json_flag(parser, "the report's tables and its answer")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, draw, write, and return the exit status."""
+    for name in ("seeds", "jobs"):
+        if getattr(arguments, name) < 1:
+            raise UsageError(f"--{name} is {getattr(arguments, name)}; give 1 or more")
+    if not kernels_compiled:
+        print("dubins_rrt paper: the kernels are not compiled, so this takes hours; install a C compiler and the package again",
+              file=sys.stderr)
+    check_folder(arguments.json)
+    folder, begin = Path(arguments.out), time.perf_counter()
+    folder.mkdir(parents=True, exist_ok=True)
+    measured = _measured(folder / LINES, arguments.seeds, arguments.jobs)
+    _report(folder, measured, arguments, begin)
+    return 0
+
+
+def _measured(file: Path, seeds: int, jobs: int) -> Measured:
+    """What came of all runs, each written to the file as soon as it is there."""
+    runs, done = all_runs(seeds), {}
+    with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(outcomes(runs, jobs)) as running:
+        for run, outcome in with_bar(running, len(runs), " runs"):
+            done[run] = outcome
+            figures = {name: value if outcome.solved or name == "reach" else None for name, value in outcome._asdict().items()}
+            out.write(json.dumps(run._asdict() | figures, allow_nan=False) + "\n")
+    return Measured(done, seeds)
+
+
+def _report(folder: Path, measured: Measured, arguments: argparse.Namespace, begin: float) -> None:
+    """Draw the figures and write the report of what was begun then."""
+    from .figures import drawn_figures, figure_count  # here, for matplotlib takes long to import
+    from .report import headline, to_document, to_markdown
+    for _ in with_bar(drawn_figures(folder, measured), figure_count(), " figures"):
+        pass
+    seconds = time.perf_counter() - begin
+    (folder / REPORT).write_text(to_markdown(measured, arguments.jobs, seconds), encoding="utf-8")
+    if arguments.json:
+        write_document(arguments.json, finite({"report": str(folder / REPORT), "seconds": seconds, **to_document(measured)}))
+    print(f"{headline(measured)}\n{folder / REPORT}: {len(measured.outcomes)} runs in {seconds:.0f} s",
+          file=words_for(arguments.json))

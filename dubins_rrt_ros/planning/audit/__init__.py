@@ -1,0 +1,5 @@
+"""The independent judge of paths: shapely and plain numpy, no algorithm in common with the search."""
+
+from .verdict import Audit, audit_path
+
+__all__ = ["Audit", "audit_path"]

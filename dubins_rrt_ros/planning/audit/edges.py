@@ -1,0 +1,73 @@
+"""The audit of curves that are no path, such as the edges of a tree, and of poses: many at once, each on its own."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..curves.dubins import DubinsCurve
+from ..curves.path import Path
+from ..maps.model import GridMap
+from ..problem import Pose, Problem
+from .obstacles import PathsideSquares, obstacles_of
+from .sweep import PRECISION, SHARE, Arcs, Disc, Outline, clearance_findings
+from .verdict import TOLERANCE, apart, broken_parts, driven_arcs, turn_findings
+
+
+def audit_curves(curves: Sequence[DubinsCurve], ends: Sequence[Pose], problem: Problem) -> tuple[str, ...]:
+    """Judge curves that the problem's vehicle shall be able to drive, each from its start to its end.
+
+    Returns:
+        What is wrong, one sentence each, which names the curve by its index.
+    """
+    if not curves:
+        return ()
+    together = Path(problem.start, problem.start, tuple(curves))
+    if broken := broken_parts(together):
+        return broken
+    _, driven, arcs = driven_arcs(together)
+    findings = list(turn_findings(together, problem))
+    for i, (end, there) in enumerate(zip(driven, ends, strict=True)):
+        off, turned = apart(end, there)
+        if not (off <= TOLERANCE and turned <= TOLERANCE):
+            findings.append(f"curve {i} ends {off:.6g} m and {turned:.6g} rad from where it shall, {tuple(there)}")
+    too_near, _ = clearance_findings(arcs, problem)
+    if too_near:  # which tells one place for all curves
+        found = ((i, clearance_findings(_only(curve, problem), problem)[0]) for i, curve in enumerate(curves))
+        findings += [f"along curve {i}, {curve_finding}" for i, some in found for curve_finding in some] or too_near
+    return tuple(findings)
+
+
+def curve_gap(curve: DubinsCurve, problem: Problem) -> tuple[float, float]:
+    """The least gap between the vehicle and the obstacles along a curve, as it was measured, and by how much less it may be [m].
+
+    Where there is contact, the gap is that of the first contact found: 0, or for a disc minus how deep it is.
+    """
+    _, least = clearance_findings(_only(curve, problem), problem)
+    return least - _own_radius(problem), max(PRECISION, SHARE * least)
+
+
+def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
+    """The gaps between the vehicle and the obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
+    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
+    x, y, theta = np.asarray(poses, dtype=float).T
+    if not outline:
+        return Disc(obstacles_of(map, unknown)).clearance(x, y, theta) - problem.vehicle.robot_radius
+    if isinstance(map, GridMap):
+        reach = problem.vehicle.robot_radius + 8 * map.resolution
+        obstacles = PathsideSquares(map, unknown, x + 1j * y, problem.vehicle.robot_radius, reach)
+    else:
+        obstacles = obstacles_of(map, unknown)
+    return Outline(outline, obstacles).clearance(x, y, theta)
+
+
+def clearances(points: np.ndarray, problem: Problem) -> np.ndarray:
+    """The distances of (n, 2) points from the obstacles [m]; 0 in one."""
+    return obstacles_of(problem.map, problem.allow_unknown).distance(*np.asarray(points, dtype=float).T)
+
+
+def _only(curve: DubinsCurve, problem: Problem) -> Arcs:
+    return driven_arcs(Path(curve.start, curve.start, (curve,)))[2]
+
+
+def _own_radius(problem: Problem) -> float:
+    return 0.0 if problem.vehicle.outline else problem.vehicle.robot_radius

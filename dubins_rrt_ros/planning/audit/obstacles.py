@@ -1,0 +1,227 @@
+"""The obstacles' true shapes, for the audit: how far points, and polygons on a path, are from them.
+
+For a grid they are the squares of its blocked cells and what is outside of it, for polygons what is outside of them.
+"""
+
+import math
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import shapely
+
+from ..maps.model import GridMap, Map
+
+#: Obstacles in a grid are looked for within so many cells of a point at first.
+FIRST_REACH = 8
+#: Cells are read, and kept, in square tiles with a margin around: the margin at least, the side of a tile in margins.
+MARGIN, TILE = 64, 8
+#: About how many rows of cells are searched at once, for the sake of memory.
+ROWS_AT_ONCE = 1_000_000
+#: Along the path of a polygon cells are read in squares of so many to a side.
+BLOCK = 32
+
+
+class PolygonObstacles:
+    """What is outside of polygons."""
+
+    def __init__(self, free: shapely.Geometry):
+        self._free = free
+        corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(free)), return_index=True)
+        edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
+        self._tree = shapely.STRtree(shapely.linestrings(edges))
+
+    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Of points from the obstacles; 0 in one."""
+        inside = shapely.contains_xy(self._free, x, y)
+        out = np.zeros(len(x))
+        out[inside] = _to_nearest(self._tree, shapely.points(x[inside], y[inside]))
+        return out
+
+    def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
+        """Of polygons, or of the convex hulls of their corners, from the obstacles; 0 where they meet.
+
+        Args:
+            corners: (n, c) complex, x + iy [m].
+        """
+        # Where no edge is in a shape, all of it is on the side of the edges that its first corner is on.
+        inside = shapely.contains_xy(self._free, corners[:, 0].real, corners[:, 0].imag)
+        out = np.zeros(len(corners))
+        out[inside] = _to_nearest(self._tree, _shapes(corners[inside], hull))
+        return out
+
+
+class GridObstacles:
+    """The squares of a grid's blocked cells, and what is outside the grid. Only cells near the points asked for are read."""
+
+    def __init__(self, grid: GridMap, allow_unknown: bool):
+        # Not the grid itself: it would be kept alive by what is kept for as long as it lives.
+        self._data, self._resolution, self._origin = grid.data, grid.resolution, grid.origin
+        self._allow_unknown = allow_unknown
+        self._windows: dict[tuple[int, complex], _Window] = {}
+
+    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Of points from the obstacles; 0 in one."""
+        x0, y0, yaw = self._origin
+        rows, columns = self._data.shape
+        place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
+        to_edge = np.minimum.reduce([place.real, columns - place.real, place.imag, rows - place.imag])
+        out = np.where(to_edge > 0, to_edge, 0.0)
+        reach, undecided = FIRST_REACH, np.flatnonzero(out)
+        while len(undecided):
+            out[undecided] = np.minimum(out[undecided], self._within(reach, place[undecided]))
+            undecided = undecided[out[undecided] >= reach]
+            reach *= 4
+        return out * self._resolution
+
+    def _within(self, reach: int, place: np.ndarray) -> np.ndarray:
+        """How far points in the grid are from blocked cells, in cells; infinity where none is nearer than `reach`."""
+        margin = max(MARGIN, reach)
+        side = TILE * margin
+        tiles = place.real // side + 1j * (place.imag // side)
+        out = np.empty(len(place))
+        at_once = max(1, ROWS_AT_ONCE // reach)
+        for tile in set(tiles.tolist()):
+            if (margin, tile) not in self._windows:
+                self._windows[margin, tile] = self._window(side * tile, side, margin)
+            here = np.flatnonzero(tiles == tile)
+            for first in range(0, len(here), at_once):
+                some = here[first:first + at_once]
+                out[some] = self._windows[margin, tile].distance(place[some], reach)
+        return np.where(out < reach, out, math.inf)
+
+    def _window(self, corner: complex, side: int, margin: int) -> "_Window":
+        """The cells of a square tile and those within the margin around it."""
+        left, low = max(0, int(corner.real) - margin), max(0, int(corner.imag) - margin)
+        part = self._data[low:int(corner.imag) + side + margin, left:int(corner.real) + side + margin]
+        return _Window(GridMap(part, self._resolution).blocked(self._allow_unknown), left, low)
+
+
+class _Window:
+    """The blocked cells of a part of a grid.
+
+    Args:
+        blocked: (rows, columns) bool.
+        left, low: the column and the row of the grid where the part begins.
+    """
+
+    def __init__(self, blocked: np.ndarray, left: int, low: int):
+        self._rows = np.flatnonzero(blocked.any(axis=1))
+        # With blocked columns on both sides every cell has a blocked one before and after it in its row.
+        blocked = np.pad(blocked[self._rows], ((0, 0), (1, 1)), constant_values=True)
+        self._width = blocked.shape[1]
+        self._cells = np.flatnonzero(blocked)
+        self._left, self._low = left - 1, low
+
+    def distance(self, place: np.ndarray, reach: int) -> np.ndarray:
+        """Of points from the blocked cells, in cells, where it is below `reach`; elsewhere it is `reach` or more.
+
+        In each of the rows so near to a point that hold such cells, the next to the left and to the right are looked up.
+        """
+        if not len(self._rows):
+            return np.full(len(place), math.inf)
+        x, y = (place.real - self._left)[:, None], (place.imag - self._low)[:, None]
+        to_either_side = min(reach, len(self._rows))
+        row = np.searchsorted(self._rows, y.astype(int)) + np.arange(-to_either_side, to_either_side + 1)
+        row = np.minimum(np.maximum(row, 0), len(self._rows) - 1)
+        begin = row * self._width
+        following = np.searchsorted(self._cells, begin + x.astype(int))
+        beside = np.minimum(self._cells[following] - begin - x, x - (self._cells[following - 1] - begin) - 1)
+        above = np.maximum(self._rows[row] - y, y - self._rows[row] - 1)
+        return np.sqrt((np.maximum(beside, 0)**2 + np.maximum(above, 0)**2).min(axis=1))
+
+
+class PathsideSquares:
+    """The squares of a grid's blocked cells along a path, and what is outside the grid, for shapes that move along the path.
+
+    Args:
+        points: of the path, x + iy [m].
+        margin: how far from the nearest of those points a shape may extend [m].
+        reach: how far from a shape obstacles matter [m]; cells further than margin and reach from the points are not read.
+    """
+
+    def __init__(self, grid: GridMap, allow_unknown: bool, points: np.ndarray, margin: float, reach: float):
+        self._grid = grid
+        near = self._blocks_near(points, (margin + reach) / grid.resolution)
+        #: Distances are exact up to here, and never more [m].
+        self.reach = math.inf if near.all() else reach
+        rectangles = [np.empty((0, 4), int)]
+        for row, first, end in (BLOCK * _runs(near)).tolist():
+            part = GridMap(grid.data[row:row + BLOCK, first:end], grid.resolution).blocked(allow_unknown)
+            rectangles.append(_rectangles(part) + np.array([first, row, first, row]))
+        self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
+
+    def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
+        """Of polygons, or of the convex hulls of their corners, from the obstacles, 0 where they meet; never more than `reach`.
+
+        Args:
+            corners: (n, c) complex, x + iy [m].
+        """
+        place = self._place(corners)
+        rows, columns = self._grid.data.shape
+        to_edge = np.minimum.reduce([place.real, columns - place.real, place.imag, rows - place.imag]).min(axis=1)
+        out = np.where(to_edge > 0, to_edge, 0.0)
+        inside = np.flatnonzero(out)
+        if len(self._tree):
+            out[inside] = np.minimum(out[inside], _to_nearest(self._tree, _shapes(place[inside], hull)))
+        return np.minimum(out * self._grid.resolution, self.reach)
+
+    def _place(self, points: np.ndarray) -> np.ndarray:
+        """Points in the grid's own frame, in cells."""
+        x, y, yaw = self._grid.origin
+        return (points - complex(x, y)) * np.exp(-1j * yaw) / self._grid.resolution
+
+    def _blocks_near(self, points: np.ndarray, distance: float) -> np.ndarray:
+        """Which blocks of the grid hold everything within a distance of points, in cells."""
+        near = np.zeros([-(-cells // BLOCK) for cells in self._grid.data.shape], bool)
+        place = self._place(points) / BLOCK
+        # A point outside the grid may count as one at its edge: there the shape meets an obstacle wherever the cells are.
+        blocks = np.clip(np.column_stack([place.imag, place.real]), 0, np.array(near.shape) - 1).astype(int)
+        around = math.ceil(min(distance / BLOCK, max(near.shape)))
+        for row, column in np.unique(blocks, axis=0).tolist():
+            near[max(0, row - around):row + around + 1, max(0, column - around):column + around + 1] = True
+        return near
+
+
+def _runs(cells: np.ndarray) -> np.ndarray:
+    """(n, 3) row, first column and the column after the last of the runs of True along the rows of an array."""
+    padded = np.pad(cells, ((0, 0), (1, 1)))
+    row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
+    return np.column_stack([row[::2], column[::2], column[1::2]])
+
+
+def _rectangles(cells: np.ndarray) -> np.ndarray:
+    """(n, 4) first column, first row, and those after the last, of rectangles that make up what is True.
+
+    They are the runs along rows, and where such are alike in successive rows, they are one.
+    """
+    row, first, end = _runs(cells).T
+    order = np.lexsort((row, end, first))
+    row, first, end = row[order], first[order], end[order]
+    begins = np.ones(len(row), bool)
+    begins[1:] = (np.diff(first) != 0) | (np.diff(end) != 0) | (np.diff(row) != 1)
+    return np.column_stack([first[begins], row[begins], end[begins], row[np.roll(begins, -1)] + 1])
+
+
+def _shapes(corners: np.ndarray, hull: bool) -> np.ndarray:
+    """The polygons with these corners, (n, c) complex, or the convex hulls of them."""
+    coordinates = np.stack([corners.real, corners.imag], axis=-1)
+    return shapely.convex_hull(shapely.linestrings(coordinates)) if hull else shapely.polygons(coordinates)
+
+
+def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray) -> np.ndarray:
+    """How far shapes are from the nearest in a tree."""
+    _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
+    return distance
+
+
+Obstacles = GridObstacles | PolygonObstacles
+_obstacles: WeakKeyDictionary[Map, dict[bool, Obstacles]] = WeakKeyDictionary()
+
+
+def obstacles_of(map: Map, allow_unknown: bool) -> Obstacles:
+    """Kept as long as the map, for the next path on it."""
+    by_unknown = _obstacles.setdefault(map, {})
+    if allow_unknown not in by_unknown:
+        by_unknown[allow_unknown] = (GridObstacles(map, allow_unknown) if isinstance(map, GridMap)
+                                     else PolygonObstacles(map.free))
+    return by_unknown[allow_unknown]

@@ -1,0 +1,206 @@
+"""What a vehicle sweeps along arcs, for the audit: its least clearance, with an error bound that holds between samples too.
+
+A disc is judged by the point in its middle. On a piece of length s with clearances c and c' at its ends no point has less than
+(c + c' - s) / 2, since the clearance changes by at most a metre per metre.
+
+A polygon is judged by its edges. What it sweeps is where it begins, and what its edges sweep. On a piece every point of an edge
+runs along a circle or straight on, so it stays within the sagitta of that arc from its chord, and all these chords lie in the
+convex hull of where the edge begins and where it ends. So nothing on the piece is nearer to the obstacles than that hull, less
+the sagitta, which falls with the square of the length. For the hull to be as tight as that, an edge is divided where it moves
+along itself: on either side of that point it sweeps to one side only.
+
+Pieces are halved until the bounds decide.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..maps.model import GridMap
+from ..problem import Problem
+from ..vehicle import Vehicle
+from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
+
+#: A sample this much too near an obstacle is a finding [m]; what may lie between samples is at most that nearer still.
+CONTACT = 1e-6
+#: A vehicle without extent is judged as a disc of this radius [m]: a point may cross a line that it keeps the distance 0 to.
+POINT = 1e-5
+#: What a polygon must keep to the obstacles, as a disc its radius [m]: more than 2 CONTACT, for where it is in an obstacle its
+#: distance is 0 however deep.
+TOUCH = 3 * CONTACT
+#: The least clearance is found to within this [m], or to within this share of it.
+PRECISION, SHARE = 1e-3, 0.02
+#: With more pieces than this open the clearance counts as undecidable: the path grazes the obstacles all along.
+MOST_PIECES = 500_000
+#: About how many pieces a path is cut into at first.
+FIRST_PIECES = 64
+#: Obstacles in a grid are looked for within so many cells of a polygon at first.
+FIRST_CELLS = 24
+#: About so many points of a path, at most, tell which cells are near.
+MOST_POINTS = 10_000
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Arcs as arrays: where they begin, their curvature [1/m] (left is positive) and their length [m]."""
+
+    x: np.ndarray
+    y: np.ndarray
+    theta: np.ndarray
+    curvature: np.ndarray
+    length: np.ndarray
+
+    def at(self, index: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The poses at arc lengths `s` of the arcs `index`: along the chord, which halves the turn."""
+        half = self.curvature[index] * s / 2
+        chord = s * np.sinc(half / math.pi)
+        direction = self.theta[index] + half
+        return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
+
+    def pieces(self, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Each arc cut into pieces of one size, at most that long: their arcs' indices, where they begin and their sizes."""
+        count = np.maximum(np.ceil(self.length / longest), 1).astype(int)
+        index = np.repeat(np.arange(len(count)), count)
+        nth = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
+        size = (self.length / count)[index]
+        return index, nth * size, size
+
+
+def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0) -> tuple[list[str], float]:
+    """What is wrong with the clearance along arcs, a sentence each, and the least clearance [m].
+
+    Args:
+        slack: how far the vehicle may be from where the arcs have it [m].
+    """
+    vehicle = problem.vehicle
+    need = slack + (TOUCH if vehicle.outline else max(vehicle.robot_radius, POINT))
+    least, (x, y), decided = _least_clearance(arcs, problem, need)
+    findings = []
+    if not decided:
+        findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {need:g} m that it cannot be decided")
+    if least < need - CONTACT:
+        what = _too_near(least, vehicle, f"the {slack:.6f} m that the poses are off their arcs" if slack > CONTACT else "")
+        findings.append(f"at ({x:.3f}, {y:.3f}) {what}")
+    return findings, least
+
+
+def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
+    if vehicle.outline:
+        return f"the footprint's clearance is {least:.6f} m, " + (f"no more than {off}" if off else "which is contact")
+    return (f"the clearance is {least:.6f} m, less than the robot's radius, {vehicle.robot_radius:g} m"
+            + (f", and {off}" if off else ""))
+
+
+_Least = tuple[float, tuple[float, float], bool]
+
+
+def _least_clearance(arcs: Arcs, problem: Problem, need: float) -> _Least:
+    """The least clearance, where it is, and whether no piece can hide contact."""
+    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
+    if not outline:
+        return _narrow_down(arcs, Disc(obstacles_of(map, unknown)), need)
+    if not isinstance(map, GridMap):
+        return _narrow_down(arcs, Outline(outline, obstacles_of(map, unknown)), need)
+    reach = FIRST_CELLS * map.resolution
+    spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
+    index, begin, _ = arcs.pieces(spacing)
+    x, y, _ = arcs.at(index, begin)
+    while True:
+        squares = PathsideSquares(map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach)
+        found = _narrow_down(arcs, Outline(outline, squares), need)
+        if found[0] < squares.reach:
+            return found
+        reach *= 4
+
+
+class Disc:
+    """A vehicle that is a disc, as the point in its middle."""
+
+    def __init__(self, obstacles: Obstacles):
+        self._obstacles = obstacles
+
+    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """At poses."""
+        return self._obstacles.distance(x, y)
+
+    def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
+              at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
+        """What pieces have at least, given their clearances at both ends."""
+        return (at_begin + at_end - size) / 2
+
+
+class Outline:
+    """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor."""
+
+    def __init__(self, corners: tuple[tuple[float, float], ...], obstacles: PolygonObstacles | PathsideSquares):
+        self._corners = np.array([complex(*corner) for corner in corners])
+        self._obstacles = obstacles
+
+    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """At poses."""
+        return self._obstacles.shape_distance((x + 1j * y)[:, None] + np.exp(1j * theta)[:, None] * self._corners)
+
+    def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
+              at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
+        """What pieces have at least, given their clearances at both ends."""
+        curvature = arcs.curvature[index]
+        piece, edges = self._edges(curvature)
+        corners = []
+        for s in (begin, begin + size):
+            x, y, theta = arcs.at(index, s)
+            corners.append((x + 1j * y)[piece, None] + np.exp(1j * theta)[piece, None] * edges)
+        swept = self._obstacles.shape_distance(np.concatenate(corners, axis=1), hull=True)
+        # A circle's arc that turns by an angle a has the sagitta r (1 - cos(a / 2)), which is at most r a^2 / 8.
+        speed = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
+        sagitta = speed * np.abs(curvature) * size**2 / 8
+        return np.minimum(at_begin, np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(index)))) - sagitta)
+
+    def _edges(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The edges, in the vehicle's frame, divided where they move along themselves while it drives with the curvatures.
+
+        Returns:
+            For each of them the index of the curvature, and both ends, (n, 2).
+        """
+        first = np.tile(self._corners, (len(curvature), 1))
+        along = np.roll(first, -1, axis=1) - first
+        # A point p of the vehicle moves by 1 + ikp per metre; across the edge it moves by this, which changes evenly along it.
+        across = (np.conj(along) * (1 + 1j * curvature[:, None] * first)).imag
+        across_last = (np.conj(along) * (1 + 1j * curvature[:, None] * (first + along))).imag
+        divided = across * across_last < 0
+        share = np.divide(across, across - across_last, out=np.ones(across.shape), where=divided)
+        ends = np.stack([first, first + share * along, first + along], axis=2)
+        parts = np.stack([ends[:, :, :2], ends[:, :, 1:]], axis=2)
+        kept = np.stack([np.ones_like(divided), divided], axis=2)
+        return np.nonzero(kept)[0], parts[kept]
+
+
+def _narrow_down(arcs: Arcs, vehicle: Disc | Outline, need: float) -> _Least:
+    """The least clearance, where it is, and whether no piece can hide contact: they are halved until that is so."""
+    index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
+
+    def clearance(index, s):
+        nonlocal least, where
+        x, y, theta = arcs.at(index, s)
+        found = vehicle.clearance(x, y, theta)
+        nearest = int(np.argmin(found))
+        if found[nearest] < least:
+            least, where = float(found[nearest]), (float(x[nearest]), float(y[nearest]))
+        return found
+
+    least, where = math.inf, (math.nan, math.nan)
+    # A piece ends where the next begins, but for the last of an arc.
+    last = np.append(index[1:] != index[:-1], True)
+    at_begin, at_ends = np.split(clearance(np.append(index, index[last]), np.append(begin, arcs.length)), [len(index)])
+    at_end = np.roll(at_begin, -1)
+    at_end[last] = at_ends
+    while 0 < len(index) <= MOST_PIECES and least >= need - CONTACT:
+        bound = vehicle.bound(arcs, index, begin, size, at_begin, at_end)
+        open_ = (bound < need - 2 * CONTACT) | (bound < least - max(PRECISION, SHARE * least))
+        index, begin, size, at_begin, at_end = (a[open_] for a in (index, begin, size / 2, at_begin, at_end))
+        if len(index):
+            at_middle = clearance(index, begin + size)
+            begin = np.concatenate([begin, begin + size])
+            at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
+            index, size = np.tile(index, 2), np.tile(size, 2)
+    return least, where, len(index) <= MOST_PIECES

@@ -1,0 +1,1 @@
+"""Exact clearance, footprints, and the motions that are free."""

@@ -1,0 +1,1 @@
+"""The Dubins curve and the path: what a vehicle drives between two poses."""

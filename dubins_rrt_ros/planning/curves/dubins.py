@@ -1,0 +1,131 @@
+"""Dubins curves: the shortest paths of a car that drives forward and turns no tighter than its turning radius.
+
+L. E. Dubins, On curves of minimal length with a constraint on average curvature, American Journal of Mathematics 79 (1957):
+one of six words of left (L), right (R) and straight (S) is shortest. The formulas are those of section III of A. Khanal,
+RRT and RRT* Using Vehicle Dynamics, with its misprints corrected; `_kernels/dubins.py` cites each.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._kernels import dubins as _kernel
+from ..problem import Pose
+
+WORDS: tuple[str, ...] = _kernel.WORDS
+
+#: By how much rounding may change a length, as a share of it.
+ROUNDING = 1e-9
+
+
+class CurveError(ValueError):
+    """A curve that breaks one of its invariants; the message says which, with its figures."""
+
+
+@dataclass(frozen=True)
+class DubinsCurve:
+    """Three arcs driven from a pose.
+
+    Attributes:
+        start: (x [m], y [m], theta [rad]).
+        radius: the turning radius [m].
+        word: the turns of the arcs, one of WORDS.
+        lengths: the lengths of the arcs [m].
+    """
+
+    start: Pose
+    radius: float
+    word: str
+    lengths: tuple[float, float, float]
+
+    @property
+    def length(self) -> float:
+        """Its length [m]."""
+        first, second, third = self.lengths
+        return first + second + third
+
+    @property
+    def end(self) -> Pose:
+        """The pose at its end, as driven."""
+        return self.pose_at(self.length)
+
+    def pose_at(self, s: float) -> Pose:
+        """The pose at arc length `s` [m] in [0, length].
+
+        Raises:
+            ValueError: `s` is outside the curve.
+        """
+        if not 0 <= s <= self.length:
+            raise ValueError(f"s is {s} m; the curve is {self.length} m long, so give 0 to {self.length}")
+        return _kernel.pose_along(*self.start, self.radius, WORDS.index(self.word), *self.lengths, s)
+
+    def poses(self, spacing: float) -> np.ndarray:
+        """(n, 3) float64 poses at most `spacing` [m] apart, both ends and the joints between the arcs included.
+
+        Raises:
+            ValueError: `spacing` is not positive.
+        """
+        if not spacing > 0:
+            raise ValueError(f"spacing is {spacing} m; it must be positive")
+        stations = [np.zeros(1)]
+        begin = 0.0
+        for length in self.lengths:
+            if length > 0:
+                steps = math.ceil(length / spacing)
+                stations.append(begin + length * (np.arange(1, steps + 1) / steps))
+                begin += length
+        stations = np.concatenate(stations)
+        out = np.empty((len(stations), 3))
+        _kernel.poses_along(*self.start, self.radius, WORDS.index(self.word), *self.lengths, stations, out)
+        return out
+
+    def check(self) -> None:
+        """Check the invariants: a car can drive it, and its turns are those of a shortest curve or of a piece of one.
+
+        Raises:
+            CurveError: one does not hold.
+        """
+        if self.word not in WORDS:
+            raise CurveError(f"{self.word!r} is none of the words {', '.join(WORDS)}")
+        if not all(map(math.isfinite, self.start)):
+            raise CurveError(f"it starts at {self.start}, where not all numbers are finite")
+        if not 0 < self.radius < math.inf:
+            raise CurveError(f"its turning radius is {self.radius} m, not positive and finite")
+        if not all(0 <= length < math.inf for length in self.lengths):
+            raise CurveError(f"its arcs are {self.lengths} m long, not all of them finite and at least 0")
+        self._check_turns()
+
+    def _check_turns(self) -> None:
+        turns = [length / self.radius for turn, length in zip(self.word, self.lengths, strict=True) if turn != "S"]
+        if max(turns) > math.tau * (1 + ROUNDING):
+            raise CurveError(f"an arc of {self.word} turns by {max(turns):.9g} rad, more than a full circle")
+        # All three are there: it is no piece of a longer curve that was cut within the second.
+        if len(turns) == 3 and min(turns) > 0 and turns[1] < math.pi * (1 - ROUNDING):
+            raise CurveError(f"the second arc of {self.word} turns by {turns[1]:.9g} rad, less than pi, as on no shortest curve")
+
+
+def shortest(start: Pose, goal: Pose, radius: float) -> DubinsCurve:
+    """The shortest Dubins curve from `start` to `goal`; equal poses have length 0.
+
+    Args:
+        start, goal: (x [m], y [m], theta [rad]).
+        radius: the turning radius [m].
+    """
+    word, *lengths = _kernel.shortest_curve(*start, *goal, radius)
+    return DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
+
+
+def candidates(start: Pose, goal: Pose, radius: float) -> dict[str, DubinsCurve]:
+    """Of each word the curve from `start` to `goal`, where there is one."""
+    return {WORDS[word]: DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
+            for word, *lengths in _kernel.all_curves(*start, *goal, radius)}
+
+
+def lengths(starts: np.ndarray, goals: np.ndarray, radius: float) -> np.ndarray:
+    """The lengths [m] of the shortest curves between (..., 3) arrays of poses, which are broadcast against each other."""
+    shape = np.broadcast_shapes(np.shape(starts), np.shape(goals))
+    both = (np.broadcast_to(np.asarray(poses, dtype=float), shape).reshape(-1, 3) for poses in (starts, goals))
+    out = np.empty(shape[:-1])
+    _kernel.shortest_lengths(*(np.require(poses, requirements="CW") for poses in both), radius, out.reshape(-1))
+    return out

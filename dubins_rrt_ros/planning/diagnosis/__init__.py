@@ -1,0 +1,1 @@
+"""Why there is no path, in sentences with figures."""

@@ -1,0 +1,1 @@
+"""Free and occupied space, and the readers of map files."""

@@ -1,0 +1,107 @@
+"""Where maps and the package's node are, whichever way it was installed."""
+
+import os
+import re
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+from .files import expand_home
+from .model import MapNotFound
+
+PACKAGE = "dubins_rrt_ros"
+_URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<host>[^/]*)/?(?P<path>.*)", re.DOTALL)
+
+
+def _ament_prefixes() -> list[Path]:
+    """Where colcon and apt may have installed the package."""
+    return [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+
+
+def _share_folders(package: str) -> list[Path]:
+    """Where a package's shared files may be: with colcon or apt; our own also with pip, or in the source tree."""
+    folders = [prefix / "share" / package for prefix in _ament_prefixes()]
+    if package == PACKAGE:
+        folder = Path(__file__).resolve().parents[2]
+        # Above lib/python3.12/site-packages/dubins_rrt_ros: of a workspace, too, that was not sourced.
+        prefixes = [*folder.parents[3:4], Path(sys.prefix)]
+        folders += [*(prefix / "share" / package for prefix in prefixes), folder.parent]
+    return folders
+
+
+def maps_directory() -> Path:
+    """The folder of the package's own maps: in the share folder (of colcon or apt, then of pip), or in the source tree."""
+    folders = [folder / "maps" for folder in _share_folders(PACKAGE)]
+    return next((folder for folder in folders if folder.is_dir()), folders[-1])
+
+
+def find_map(name: str) -> Path:
+    """The file of a map.
+
+    Args:
+        name: a path, where a leading `~` is the home directory; the name of one of the package's own maps, with or
+            without its ending; or a URL, `file:///PATH` or `package://PACKAGE/PATH IN ITS SHARE FOLDER`.
+
+    Raises:
+        MapNotFound: there is none.
+    """
+    if not name:
+        raise MapNotFound(f"the name of the map is empty; give {_choices()}")
+    url = _URL.fullmatch(name)
+    # pathlib's is_file() raises for names that are too long or in a folder that is closed to us.
+    path = next(filter(os.path.isfile, [_path_of(url)] if url else _places(name)), None)
+    if path is None:
+        raise MapNotFound(f"{name}: no such map file; give {_choices()}")
+    return path
+
+
+def _choices() -> str:
+    own = sorted(file.name for file in maps_directory().glob("*") if file.suffix in (".yaml", ".geojson", ".wkt"))
+    return ("a path, a file:// or package:// URL, or one of the package's own maps: "
+            f"{', '.join(own) or 'none are installed'}")
+
+
+def _places(name: str) -> list[Path]:
+    """Where the map of a name that is no URL may be."""
+    path, own = expand_home(name), maps_directory()
+    is_own = path.parent in (Path("."), Path("maps"))
+    return [path, own / path.name, own / f"{path.name}.yaml"] if is_own else [path]
+
+
+def _path_of(url: re.Match) -> Path:
+    path = unquote(url["path"], errors="surrogateescape")
+    try:
+        match url["scheme"].lower():
+            case "file":
+                return _local_path(url["host"], path)
+            case "package":
+                return _package_path(url["host"], path)
+        raise MapNotFound(f"maps are not read by {url['scheme']}://; give a file:// or package:// URL, or a path")
+    except MapNotFound as error:
+        raise MapNotFound(f"{url[0]}: {error}") from None
+
+
+def _local_path(host: str, path: str) -> Path:
+    if host.lower() not in ("", "localhost"):
+        raise MapNotFound(f"maps are not read from the host {host!r}; give file:///PATH, with three slashes")
+    return Path("/", path)
+
+
+def _package_path(package: str, path: str) -> Path:
+    if not re.fullmatch(r"\w[\w-]*", package) or Path(path).is_absolute() or ".." in Path(path).parts:
+        raise MapNotFound("names no file within a package's share folder; give package://PACKAGE/PATH, without '..'")
+    # package.xml is what every share folder holds, and the source tree, but not where pip puts our modules.
+    share = next((folder for folder in _share_folders(package) if os.path.isfile(folder / "package.xml")), None)
+    if share is None:
+        raise MapNotFound(f"no package {package} in AMENT_PREFIX_PATH; correct its name, or source the workspace that has it")
+    return share / path
+
+
+def planner_command() -> list[str]:
+    """The command that starts the node: the executable of colcon or apt, that of pip, or the source tree's module."""
+    executables = [prefix / "lib" / PACKAGE / "planner" for prefix in _ament_prefixes()]
+    if (Path(sys.prefix) / "lib" / PACKAGE).is_dir():
+        # Not the one in lib, which leaves it to the environment which interpreter it is run by.
+        executables.append(Path(sys.executable).parent / "planner")
+    executable = next((file for file in executables if os.access(file, os.X_OK)), None)
+    return [str(executable)] if executable else [sys.executable, "-m", f"{PACKAGE}.node"]

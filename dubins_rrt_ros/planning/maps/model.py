@@ -1,0 +1,194 @@
+"""Free and occupied space, from a grid or from polygons. Everything outside a map is an obstacle."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from ..text import one_line
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+#: Cell values up to the first are free, from the second on occupied, others unknown: map_server's default thresholds,
+#: 0.25 and 0.65, on the scale of nav_msgs/OccupancyGrid.
+FREE_UP_TO, OCCUPIED_FROM = 25, 65
+
+
+#: The smallest cells and the largest coordinates [m] that leave rounding far below what the planner guarantees.
+FINEST, FARTHEST = 1e-4, 1e8
+
+
+class MapError(ValueError):
+    """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
+
+    def __init__(self, message: str):
+        super().__init__(one_line(message))
+
+
+class MapNotFound(MapError):
+    """A map file, or the image that it names, that is not there or cannot be opened as a file."""
+
+
+class MapMetadataError(MapError):
+    """What describes a grid, and not its cells, that cannot be used: its YAML, its resolution, its origin."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridMap:
+    """An occupancy grid.
+
+    Attributes:
+        data: (height, width) int8, the values of nav_msgs/OccupancyGrid: -1 unknown, 0 free to 100 occupied. Row 0
+            is the lowest in the grid's own frame.
+        resolution: the side of a cell [m].
+        origin: (x [m], y [m], yaw [rad]) of the outer corner of cell (0, 0) in the map's frame.
+        name: where it came from, for messages.
+    """
+
+    data: np.ndarray
+    resolution: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    name: str = "grid"
+
+    def __post_init__(self):
+        data = np.array(self.data, order="C")
+        if data.ndim != 2 or data.size == 0:
+            raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
+        if data.dtype != np.int8 and not ((data >= UNKNOWN) & (data <= OCCUPIED)).all():
+            raise MapError(f"{self.name}: cells hold values from {data.min()} to {data.max()}; give -1 (unknown), or 0 to 100")
+        data = data.astype(np.int8, copy=False)
+        if not (math.isfinite(self.resolution) and self.resolution > 0):
+            raise MapMetadataError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
+        if not all(map(math.isfinite, self.origin)):
+            raise MapMetadataError(f"{self.name}: origin is {self.origin}; its x, y and yaw must be finite")
+        if self.resolution < FINEST or max(map(abs, (*self.origin[:2], *(n * self.resolution for n in data.shape)))) > FARTHEST:
+            raise MapMetadataError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them "
+                                   f"from ({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, "
+                                   f"cells of {FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
+        object.__setattr__(self, "data", _read_only(data))
+        object.__setattr__(self, "resolution", float(self.resolution))
+        object.__setattr__(self, "origin", tuple(map(float, self.origin)))
+
+    def blocked(self, allow_unknown: bool) -> np.ndarray:
+        """(height, width) bool: the cells that are obstacles."""
+        if allow_unknown:
+            return self.data >= OCCUPIED_FROM
+        return (self.data > FREE_UP_TO) | (self.data < 0)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height in the grid's own frame [m]."""
+        return self.data.shape[1] * self.resolution, self.data.shape[0] * self.resolution
+
+    def to_grid_frame(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) points of the map's frame in the grid's own, where cell (0, 0) has its outer corner at (0, 0)."""
+        x, y, yaw = self.origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        return (np.asarray(points, dtype=float) - (x, y)) @ np.array([[c, -s], [s, c]])
+
+    def to_map_frame(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) points of the grid's own frame in the map's."""
+        x, y, yaw = self.origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        return np.asarray(points, dtype=float) @ np.array([[c, s], [-s, c]]) + (x, y)
+
+    def window(self, centre: tuple[float, float], reach: float) -> "GridMap":
+        """The part of the grid that holds everything within `reach` [m] of a point in it."""
+        column, row = self.to_grid_frame(np.array(centre)) / self.resolution
+        cells = math.ceil(reach / self.resolution) + 1
+        left, low = max(0, int(column) - cells), max(0, int(row) - cells)
+        corner = self.to_map_frame(np.array([left, low]) * self.resolution)
+        return GridMap(self.data[low:int(row) + cells + 1, left:int(column) + cells + 1], self.resolution,
+                       (*corner, self.origin[2]), self.name)
+
+    def corners(self) -> np.ndarray:
+        """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]; read-only."""
+        return self._corners
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
+        w, h = self.size
+        return _read_only(self.to_map_frame(np.array([[0, 0], [w, 0], [w, h], [0, h]])))
+
+    @cached_property
+    def id(self) -> str:
+        """A short digest of the content."""
+        return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin)).encode())
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonMap:
+    """Free space as polygons.
+
+    Attributes:
+        free: the free space, a valid shapely Polygon or MultiPolygon in metres; holes and the outside are obstacles.
+        name: where it came from, for messages.
+    """
+
+    free: shapely.Geometry
+    name: str = "polygons"
+
+    def __post_init__(self):
+        if shapely.get_type_id(self.free) not in (3, 6) or shapely.is_empty(self.free):
+            raise MapError(f"{self.name}: the free space is a {self.free.geom_type} without area; "
+                           "give a Polygon or MultiPolygon")
+        if not shapely.is_valid(self.free):
+            raise MapError(f"{self.name}: the free space is no valid polygon ({shapely.is_valid_reason(self.free)}); "
+                           "mend its rings")
+        if not np.isfinite(shapely.bounds(self.free)).all():
+            raise MapError(f"{self.name}: a coordinate is not finite; give finite metres")
+        prepare_for_threads(self.free)
+
+    def corners(self) -> np.ndarray:
+        """(4, 2) corners of the bounding rectangle, counter-clockwise [m]; read-only."""
+        return self._corners
+
+    @cached_property
+    def _corners(self) -> np.ndarray:
+        x0, y0, x1, y1 = shapely.bounds(self.free)
+        return _read_only(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]))
+
+    @cached_property
+    def id(self) -> str:
+        """A short digest of the content."""
+        return _digest(shapely.to_wkb(self.free, byte_order=1))
+
+
+Map = GridMap | PolygonMap
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.setflags(write=False)
+    return array
+
+
+def prepare_for_threads(polygons: shapely.Geometry) -> None:
+    """Prepare polygons for fast tests of points, in several threads.
+
+    What shapely prepares is built with the first two tests, which must not happen in two threads at once.
+    """
+    shapely.prepare(polygons)
+    x0, y0, x1, y1 = shapely.bounds(polygons)
+    shapely.contains_xy(polygons, [x0, x1, (x0 + x1) / 2], [y0, y1, (y0 + y1) / 2])
+
+
+def _digest(*parts: bytes) -> str:
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:12]
+
+
+def rasterise(polygons: PolygonMap, resolution: float) -> GridMap:
+    """The grid of a polygon map, with one ring of occupied cells around it.
+
+    A cell is occupied where its open square meets an obstacle, so that what is free in the grid is free in the polygons.
+    """
+    x0, y0, x1, y1 = shapely.bounds(polygons.free)
+    columns, rows = (math.ceil(side / resolution - 1e-9) + 2 for side in (x1 - x0, y1 - y0))
+    left = x0 + (np.arange(columns) - 1) * resolution
+    low = y0 + (np.arange(rows) - 1) * resolution
+    inset = 1e-9 * resolution
+    left, low = np.meshgrid(left + inset, low + inset)
+    squares = shapely.box(left, low, left + resolution - 2 * inset, low + resolution - 2 * inset)
+    data = np.where(shapely.covers(polygons.free, squares), FREE, OCCUPIED).astype(np.int8)
+    return GridMap(data, resolution, (x0 - resolution, y0 - resolution, 0.0), polygons.name)

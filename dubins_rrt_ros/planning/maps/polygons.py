@@ -1,0 +1,182 @@
+"""Free space as polygons from the text of a GeoJSON or WKT file."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..text import quoted
+from .model import MapError, PolygonMap
+
+#: The largest coordinate of a map [m]; beyond it a double cannot tell tenths of a micrometre.
+MAX_COORDINATE = 1e9
+#: How many pairs of edges of different features may cross, beyond one for each edge: a crossing takes 10 us and a kilobyte.
+MAX_CROSSINGS = 100_000
+#: How many pairs are looked at at once.
+_PAIRS = 5_000_000
+_POLYGONS = ("Polygon", "MultiPolygon")
+
+
+def parse_geojson(text: str, name: str) -> PolygonMap:
+    """The free space of a GeoJSON FeatureCollection in metres: the bounds less the union of the obstacles.
+
+    The one feature with the property `"role": "bounds"` is the bounds, every other an obstacle; a hole of an obstacle
+    is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored.
+
+    Raises:
+        MapError: the text is no such collection, or a ring is not valid; names the feature and the ring.
+    """
+    bounds, obstacles = [], []
+    for number, feature in enumerate(_features(_parse_json(text)), 1):
+        label = _label(number, feature)
+        geometry = _geometry(feature, label)
+        is_bounds = _properties(feature).get("role") == "bounds"
+        (bounds if is_bounds else obstacles).append((label, geometry))
+    if len(bounds) != 1:
+        found = ", ".join(label for label, _ in bounds[:5]) or "none"
+        raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
+    _check_crossings([geometry for _, geometry in bounds + obstacles])
+    try:
+        free = bounds[0][1] - shapely.union_all([geometry for _, geometry in obstacles])
+    except shapely.GEOSException as error:
+        raise MapError(f"features: the obstacles cannot be taken from the bounds ({error}); simplify them") from None
+    return _polygon_map(free, name, "features: the obstacles leave no free space; move or remove some")
+
+
+def _check_crossings(features: list[shapely.Geometry]) -> None:
+    """Refuse features that may cross each other so often that their union would take minutes and gigabytes."""
+    polygons, feature = shapely.get_parts(features, return_index=True)
+    rings, polygon = shapely.get_rings(polygons, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    along = ring[:-1] == ring[1:]
+    edges = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)[along])
+    owner = feature[polygon[ring[:-1][along]]]
+    tree, most, count = shapely.STRtree(edges), MAX_CROSSINGS + len(edges), 0
+    step = 1 + _PAIRS // len(edges)
+    for begin in range(0, len(edges), step):
+        some, others = tree.query(edges[begin:begin + step])
+        count += np.count_nonzero(owner[begin + some] < owner[others])
+        if count > most:
+            raise MapError(f"features: more than {most} pairs of their {len(edges)} edges may cross; unite what overlaps")
+
+
+def parse_wkt(text: str, name: str) -> PolygonMap:
+    """The free space of a WKT file: one Polygon or MultiPolygon in metres; heights are dropped.
+
+    Raises:
+        MapError: the text is no such geometry, or the geometry is not valid.
+    """
+    # GEOS recurses into nested collections without a limit, so they must not get there.
+    if not re.match(r"\s*(MULTI)?POLYGON\b", text, re.IGNORECASE):
+        start = quoted(text.strip())
+        raise MapError(f"geometry begins with {start}; give one POLYGON or MULTIPOLYGON, the free space")
+    # GEOS 3.11 ignores what follows the geometry.
+    rest = re.search(r"\)\s*([^\s,)].*)", text)
+    if rest:
+        raise MapError(f"geometry is followed by {quoted(rest[1])}; give one only, as a MULTIPOLYGON if need be")
+    try:
+        with np.errstate(all="ignore"):
+            free = shapely.force_2d(shapely.from_wkt(text))
+    except shapely.GEOSException as error:
+        raise MapError(f"geometry is no valid WKT ({error}); correct the text") from None
+    coordinates = shapely.get_coordinates(free)
+    bad = coordinates[~(np.abs(coordinates) <= MAX_COORDINATE)]
+    if bad.size:
+        allowed = f"metres from {-MAX_COORDINATE:g} to {MAX_COORDINATE:g}"
+        raise MapError(f"geometry has the coordinate {bad[0]}; give {allowed}")
+    return _polygon_map(_valid(free, "geometry"), name, "geometry is empty; give a polygon with an area")
+
+
+def _polygon_map(free: shapely.Geometry, name: str, when_empty: str) -> PolygonMap:
+    if shapely.is_empty(free):
+        raise MapError(when_empty)
+    return PolygonMap(free, name)
+
+
+def _parse_json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise MapError("JSON is nested too deep; give a FeatureCollection of polygons") from None
+    except ValueError as error:
+        raise MapError(f"is no valid JSON ({error}); correct the text") from None
+
+
+def _features(document: Any) -> list:
+    kind = document.get("type") if isinstance(document, dict) else None
+    if kind == "Feature":
+        return [document]
+    if kind != "FeatureCollection":
+        raise MapError(f"type is {quoted(kind)}; give a FeatureCollection")
+    features = document.get("features")
+    if not isinstance(features, list):
+        raise MapError(f"features is {quoted(features)}; give a list of features")
+    return features
+
+
+def _properties(feature: Any) -> dict:
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    return properties if isinstance(properties, dict) else {}
+
+
+def _label(number: int, feature: Any) -> str:
+    properties = _properties(feature)
+    outer = feature.get("id") if isinstance(feature, dict) else None
+    candidates = (properties.get("name"), properties.get("id"), outer)
+    name = next((c for c in candidates if isinstance(c, str | int | float)), None)
+    return f"feature {number}" if name is None else f"feature {number} ({quoted(name)})"
+
+
+def _geometry(feature: Any, label: str) -> shapely.Geometry:
+    if not isinstance(feature, dict) or feature.get("type") != "Feature":
+        raise MapError(f"{label} is {quoted(feature)}; give an object with the type Feature")
+    geometry = feature.get("geometry")
+    kind = geometry.get("type") if isinstance(geometry, dict) else None
+    if kind not in _POLYGONS:
+        raise MapError(f"{label}: geometry has the type {quoted(kind)}; give a Polygon or MultiPolygon")
+    coordinates = geometry.get("coordinates")
+    if not isinstance(coordinates, list) or not coordinates:
+        raise MapError(f"{label}: coordinates is {quoted(coordinates)}; give a list of rings")
+    if kind == "Polygon":
+        return _polygon(coordinates, label)
+    polygons = [_polygon(rings, f"{label}, polygon {i}") for i, rings in enumerate(coordinates, 1)]
+    return _valid(shapely.MultiPolygon(polygons), label)
+
+
+def _polygon(rings: Any, label: str) -> shapely.Polygon:
+    if not isinstance(rings, list) or not rings:
+        raise MapError(f"{label}: coordinates is {quoted(rings)}; give a list of rings")
+    shell, *holes = (_ring(ring, f"{label}, ring {i}") for i, ring in enumerate(rings, 1))
+    return _valid(shapely.Polygon(shell, holes), label)
+
+
+def _ring(ring: Any, label: str) -> shapely.LinearRing:
+    if not isinstance(ring, list) or len(ring) < 4:
+        count = f"has {len(ring)} positions" if isinstance(ring, list) else f"is {quoted(ring)}"
+        raise MapError(f"{label} {count}; give at least 4, the last like the first")
+    positions = list(_positions(ring, label))
+    if positions[0] != positions[-1]:
+        ends = f"{positions[0]} to {positions[-1]}"
+        raise MapError(f"{label} is not closed ({ends}); repeat its first position as the last")
+    return _valid(shapely.LinearRing(positions), label)
+
+
+def _positions(ring: list, label: str) -> Iterator[tuple[float, float]]:
+    for number, position in enumerate(ring, 1):
+        if not isinstance(position, list) or len(position) < 2 or not all(map(_is_coordinate, position[:2])):
+            allowed = f"two numbers of metres from {-MAX_COORDINATE:g} to {MAX_COORDINATE:g}"
+            raise MapError(f"{label}: position {number} is {quoted(position)}; give {allowed}")
+        yield float(position[0]), float(position[1])
+
+
+def _is_coordinate(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) <= MAX_COORDINATE
+
+
+def _valid(geometry: shapely.Geometry, label: str) -> shapely.Geometry:
+    if not shapely.is_valid(geometry):
+        raise MapError(f"{label} is not valid ({shapely.is_valid_reason(geometry)}); mend its rings")
+    return geometry

@@ -1,0 +1,1 @@
+"""RRT and RRT*, hybrid A*, smoothing, sampling and the cost-to-go."""

@@ -1,0 +1,27 @@
+"""Shortcuts and detours: a path made shorter by Dubins curves that are as free."""
+
+import numpy as np
+
+from .._kernels.polish import Polisher
+from ..collision.clearance import ClearanceField
+from ..curves.chain import Chain
+from ..vehicle import Vehicle
+
+#: How many changes are tried in one go.
+TRIES = 512
+#: The share of shortcuts, which are coarse, among them: for a path that was just found, and for one that was polished before.
+FRESH, KNOWN = 0.8, 0.3
+
+
+def polished(chain: Chain, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, fresh: bool) -> Chain:
+    """A path with the same ends that is never longer.
+
+    Args:
+        chain: it is free for the vehicle; so is the answer.
+        fresh: whether it was not polished before, and may have large loops.
+    """
+    draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
+    polisher = Polisher(field.body(vehicle), vehicle.turning_radius, *chain, TRIES)
+    polisher.polish(draws, FRESH if fresh else KNOWN)
+    arrays = (np.array(view[:polisher.count]) for view in (polisher.poses, polisher.words, polisher.lengths))
+    return Chain(*arrays)
