@@ -18,7 +18,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 import pytest
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 import dubins_rrt_ros
 

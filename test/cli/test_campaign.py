@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.campaign import judge as campaign_judge
@@ -131,7 +131,7 @@ def test_an_exception_is_found_and_told_with_the_command_that_repeats_it(monkeyp
     def fail(problem, field):
         raise ZeroDivisionError("planted")
 
-    monkeypatch.setattr(planner.reasons, "before_search", fail)
+    monkeypatch.setattr(planner.explain, "before_search", fail)
     status, out, _ = run("--problems", "2", "--first", "7", "--seed", "3", capsys=capsys)
     assert status == 1 and "2 problems of seed 3" in out and "2 disagreements" in out
     assert "repeat it with `dubins_rrt campaign --seed 3 --first 8 --problems 1`:\n  ZeroDivisionError in fail" in out

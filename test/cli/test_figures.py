@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import needs_compiled, random_map
 from matplotlib.image import imread
+from support.cases import needs_compiled, random_map
 
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.figures import command as figures

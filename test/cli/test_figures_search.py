@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.common.plots import PATH
 from dubins_rrt_ros.evaluation.figures import search as figures_search

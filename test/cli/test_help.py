@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli import main as program
 from dubins_rrt_ros.cli.common.flags import guard_numbers

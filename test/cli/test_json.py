@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import shapely
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.cli.main import main

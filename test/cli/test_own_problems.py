@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.bench.problems import read_cases
 from dubins_rrt_ros.cli.main import main

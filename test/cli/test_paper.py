@@ -11,8 +11,8 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from cases import needs_compiled
 from matplotlib.image import imread
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, Outcome, Run

@@ -9,7 +9,7 @@ import termios
 import time
 
 import pytest
-from cases import needs_compiled
+from support.cases import needs_compiled
 
 PLAN = ["plan", "maze", "--start", "1.5", "2", "1.57", "--goal", "13.5", "10.5", "1.57", "--planner", "rrt"]
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 import shapely
-from bounded import read_or_refused
 from hypothesis import given, settings
-from mutations import json_of, spoiled_documents
+from support.bounded import read_or_refused
+from support.mutations import json_of, spoiled_documents
 
 from dubins_rrt_ros.cli.bench.problems import Case, read_cases
 from dubins_rrt_ros.cli.common.flags import UsageError

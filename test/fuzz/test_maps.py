@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 import shapely
-from bounded import Bounds, read_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from images import chunks_of, palette, pgm, png, png_of, row_of, saved
-from mutations import json_of, spoiled, spoiled_documents
+from support.bounded import Bounds, read_or_refused
+from support.images import chunks_of, palette, pgm, png, png_of, row_of, saved
+from support.mutations import json_of, spoiled, spoiled_documents
 
 from dubins_rrt_ros.planning import GridMap, MapError, MapNotFound, load_map
 from dubins_rrt_ros.planning.maps.images import read_image

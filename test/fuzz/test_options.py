@@ -4,10 +4,10 @@ import dataclasses
 import json
 
 import numpy as np
-from bounded import read_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mutations import json_of, odd_values, spoiled
+from support.bounded import read_or_refused
+from support.mutations import json_of, odd_values, spoiled
 
 from dubins_rrt_ros.planning import GridMap, InvalidPose, OptionError, Problem, Settings, Vehicle, options, values
 

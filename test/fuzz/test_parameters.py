@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from bounded import Bounds, read_or_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mutations import json_of, odd_values, spoiled
+from support.bounded import Bounds, read_or_refused
+from support.mutations import json_of, odd_values, spoiled
 
 from dubins_rrt_ros.node.parameter_files import as_yaml, unused_files
 from dubins_rrt_ros.node.parameters import OPTIONS, configuration

@@ -73,7 +73,7 @@ def map_yaml(tmp_path):
 @pytest.fixture(scope="module")
 def map_file(tmp_path_factory):
     """The yard's map as a file."""
-    from yard import yard
+    from support.yard import yard
 
     from dubins_rrt_ros.planning import GridMap, save_map
 
@@ -96,7 +96,7 @@ def module_planners():
 
 def _planners():
     pytest.importorskip("rclpy", reason="rclpy is not installed")
-    from harness import Planners
+    from support.harness import Planners
     planners = Planners()
     yield planners
     planners.close()

@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from harness import Conversation, assert_says
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
+from support.harness import Conversation, assert_says
 
 from dubins_rrt_ros.node.conversions import pose_message
 from dubins_rrt_ros.planning import OCCUPIED, UNKNOWN, GridMap, save_map

@@ -12,9 +12,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, Quaternion
-from harness import Conversation, assert_says
 from nav_msgs.srv import LoadMap
 from std_srvs.srv import Trigger
+from support.harness import Conversation, assert_says
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
 from dubins_rrt_ros.planning import OCCUPIED, GridMap

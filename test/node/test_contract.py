@@ -14,11 +14,11 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from harness import poses_of, values_of
 from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from std_srvs.srv import Trigger
-from yard import ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, IN_UNKNOWN, ON_THE_WAY_OUT, QUICK, START
+from support.harness import poses_of, values_of
+from support.yard import ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, IN_UNKNOWN, ON_THE_WAY_OUT, QUICK, START
 
 LATCHED, VOLATILE = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
 #: Of each topic the direction, the name after the namespace, the type and the durability; all are reliable.

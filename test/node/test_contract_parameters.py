@@ -7,12 +7,12 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from harness import poses_of
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 from rclpy.parameter import parameter_value_to_python
 from rosgraph_msgs.msg import Clock
-from yard import GOAL, IN_UNKNOWN, QUICK, START
+from support.harness import poses_of
+from support.yard import GOAL, IN_UNKNOWN, QUICK, START
 
 #: Of each parameter the type, the default where the contract has one, and a value that is refused.
 DOUBLE, INTEGER, BOOL, STRING = (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL,

@@ -11,9 +11,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from harness import Conversation
 from rcl_interfaces.srv import GetParameters
-from ticking_planner import INTERVAL
+from support import ticking_planner
+from support.harness import Conversation
+from support.ticking_planner import INTERVAL
 
 START, GOALS = (1.5, 5.0, 0.0), [(8.5, 5.0, 0.5), (1.5, 2.0, -2.0)]
 #: Of the package's maze.
@@ -55,7 +56,7 @@ def test_a_thousand_goals_leave_nothing_behind(planners, map_yaml, record_proper
 
 
 def test_it_answers_while_it_plans(planners, map_yaml, tmp_path, report):
-    script, file = Path(__file__).with_name("ticking_planner.py"), tmp_path / "ticks.json"
+    script, file = Path(ticking_planner.__file__), tmp_path / "ticks.json"
     process = planners.start(command=[sys.executable, str(script), str(file)], map_file=str(map_yaml),
                              samples=10_000_000, planning_time=5.0)
     client = planners.client()

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from harness import poses_of
+from support.harness import poses_of
 
 CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
 ENTRY, BAY, ACROSS = (2.5, 8.75, 0.0), (22.0, 4.1, -1.5708), (5.0, 9.0, 1.5708)

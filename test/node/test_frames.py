@@ -10,9 +10,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped
-from harness import poses_of, values_of
 from nav_msgs.srv import GetPlan
-from yard import GOAL, QUICK, START
+from support.harness import poses_of, values_of
+from support.yard import GOAL, QUICK, START
 
 from dubins_rrt_ros.node.conversions import pose_message
 from dubins_rrt_ros.planning import GridMap, save_map

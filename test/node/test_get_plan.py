@@ -9,11 +9,11 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Pose
-from harness import poses_of, values_of
 from nav_msgs.srv import GetMap, LoadMap
 from rcl_interfaces.srv import GetParameters
 from std_srvs.srv import Trigger
-from yard import BEHIND, ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
+from support.harness import poses_of, values_of
+from support.yard import BEHIND, ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, save_map
 

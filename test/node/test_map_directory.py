@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from nav_msgs.srv import GetMap, LoadMap
-from yard import GOAL, QUICK, START, yard
+from support.yard import GOAL, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, save_map
 

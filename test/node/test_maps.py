@@ -6,10 +6,10 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from harness import occupancy, poses_of, values_of
 from nav_msgs.srv import GetMap, LoadMap
 from std_srvs.srv import Trigger
-from yard import ENDLESS, GOAL, QUICK, START
+from support.harness import occupancy, poses_of, values_of
+from support.yard import ENDLESS, GOAL, QUICK, START
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan
 

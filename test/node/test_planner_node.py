@@ -11,9 +11,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose
-from harness import Conversation, assert_says, poses_of
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from support.harness import Conversation, assert_says, poses_of
 from visualization_msgs.msg import Marker
 
 from dubins_rrt_ros.planning import OCCUPIED as OCCUPIED_CELL

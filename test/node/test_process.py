@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +11,11 @@ import yaml
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time
-from harness import Conversation
 from nav_msgs.srv import LoadMap
 from rcl_interfaces.srv import GetParameters
 from std_srvs.srv import Trigger
+from support import client_to_kill
+from support.harness import Conversation
 
 from dubins_rrt_ros.node.conversions import grid_message
 from dubins_rrt_ros.node.parameters import OPTIONS
@@ -257,7 +257,7 @@ def test_a_client_that_is_killed_leaves_the_node_to_the_next(planners, map_yaml,
     client = planners.client()
     client.set_parameters(planner="rrt_star", **LONG)
     namespace = process.name.removesuffix("/planner")
-    doomed = subprocess.Popen([sys.executable, str(Path(__file__).with_name("client_to_kill.py")), namespace, what])
+    doomed = subprocess.Popen([sys.executable, client_to_kill.__file__, namespace, what])
     try:
         if what == "get_plan":
             client.wait_for(lambda: client.node.count_clients(f"{process.name}/get_plan"), "the other client")

@@ -8,10 +8,10 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from harness import occupancy, poses_of, values_of
 from nav_msgs.srv import GetMap, LoadMap
 from std_srvs.srv import Trigger
-from yard import ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
+from support.harness import occupancy, poses_of, values_of
+from support.yard import ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, load_map, save_map
 from dubins_rrt_ros.planning.maps.locate import maps_directory

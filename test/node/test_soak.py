@@ -14,8 +14,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cases import empty_map
-from soak import AT_REST, Soak, driven, length_of
+from support.cases import empty_map
+from support.soak import AT_REST, Soak, driven, length_of
 
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, audit_path, kernels_compiled, plan
 

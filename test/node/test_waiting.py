@@ -10,11 +10,11 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
-from harness import occupancy, values_of
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
-from yard import GOAL, QUICK, START
+from support.harness import occupancy, values_of
+from support.yard import GOAL, QUICK, START
 
 from dubins_rrt_ros.planning import GridMap, save_map
 

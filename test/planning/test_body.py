@@ -2,13 +2,13 @@
 
 import math
 
-import naive
 import numpy as np
 import pytest
 import shapely
-from cases import boxes_grid, holed_polygons, maze_grid, naive_clearance, scaled
 from shapely import affinity
-from test_footprint import CAR, OUTLINES
+from support import naive
+from support.cases import boxes_grid, holed_polygons, maze_grid, naive_clearance, scaled
+from support.footprints import CAR, OUTLINES
 
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap, Vehicle
 from dubins_rrt_ros.planning.curves.dubins import shortest

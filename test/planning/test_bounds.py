@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 import shapely
-from cases import (
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+from support.cases import (
     boxes_grid,
     empty_map,
     free_pose,
@@ -16,8 +18,6 @@ from cases import (
     random_problem,
     scaled,
 )
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, plan
 from dubins_rrt_ros.planning.curves.dubins import shortest

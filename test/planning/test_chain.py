@@ -3,10 +3,10 @@
 import math
 from itertools import pairwise
 
-import naive
 import numpy as np
 import pytest
-from cases import chain_of, chain_over, path_of, random_pose
+from support import naive
+from support.cases import chain_of, chain_over, path_of, random_pose
 
 from dubins_rrt_ros.planning import Path
 from dubins_rrt_ros.planning.curves.chain import Chain

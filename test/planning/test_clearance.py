@@ -4,14 +4,14 @@ import gc
 import math
 import weakref
 
-import naive
 import numpy as np
 import pytest
 import shapely
-from cases import boxes_grid, holed_polygons, maze_grid, naive_clearance, random_map, random_pose, scaled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
+from support import naive
+from support.cases import boxes_grid, holed_polygons, maze_grid, naive_clearance, random_map, random_pose, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, GridMap, PolygonMap, Vehicle
 from dubins_rrt_ros.planning.curves.dubins import shortest

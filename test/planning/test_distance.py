@@ -1,11 +1,11 @@
 """The kernels of the distance transform against brute force."""
 
-import naive
 import numpy as np
 import pytest
-from cases import scaled
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import naive
+from support.cases import scaled
 
 from dubins_rrt_ros.planning._kernels.distance import fill_columns, look_aside
 

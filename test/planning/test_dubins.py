@@ -2,12 +2,12 @@
 
 import math
 
-import naive
 import numpy as np
 import pytest
-from cases import interpreted, needs_compiled, scaled
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from support import naive
+from support.cases import interpreted, needs_compiled, scaled
 
 from dubins_rrt_ros.planning import WORDS, DubinsCurve
 from dubins_rrt_ros.planning.curves.dubins import candidates, lengths, shortest

@@ -5,22 +5,13 @@ import math
 import numpy as np
 import pytest
 import shapely
-from cases import scaled
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from support.cases import scaled
+from support.footprints import CAR, OUTLINES
 
 from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.planning.collision.footprint import cover
-
-CAR = "[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]"
-OUTLINES = {
-    "car": CAR, "clockwise": "[[3.6, -0.9], [-0.9, -0.9], [-0.9, 0.9], [3.6, 0.9]]",
-    "thin": "[[2, 0.01], [-2, 0.01], [-2, -0.01], [2, -0.01]]", "needle": "[[1.5, 0], [-0.5, 0.1], [-0.5, -0.1]]",
-    "L": "[[1, 1], [0.2, 1], [0.2, 0.2], [-1, 0.2], [-1, -0.3], [1, -0.3]]",
-    "star": "[[1, 0], [0.2, 0.2], [0, 1], [-0.2, 0.2], [-1, 0], [-0.2, -0.2], [0, -1], [0.2, -0.2]]",
-    "corners on an edge": "[[1, 0.5], [0.5, 0.5], [0, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]]",
-    "fork": "[[2, 1], [-0.2, 1], [-0.2, -1], [2, -1], [2, -0.8], [0.5, -0.8], [0.5, 0.8], [2, 0.8]]",
-}
 
 
 def check_cover(outline):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import (
+from support.cases import (
     boxes_grid,
     empty_map,
     field_of,

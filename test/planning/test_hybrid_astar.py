@@ -3,10 +3,10 @@
 import heapq
 import math
 
-import naive
 import numpy as np
 import pytest
-from cases import SCALE, empty_map, field_of, interpreted, needs_compiled, path_of, random_maps, random_problem, scaled
+from support import naive
+from support.cases import SCALE, empty_map, field_of, interpreted, needs_compiled, path_of, random_maps, random_problem, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path, load_map
 from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar

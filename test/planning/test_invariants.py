@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cases import chain_over, empty_map, path_of, random_maps, random_pose, random_problem, scaled, search_on
 from hypothesis import given
 from hypothesis import strategies as st
-from planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
+from support.cases import chain_over, empty_map, path_of, random_maps, random_pose, random_problem, scaled, search_on
+from support.planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import (
     ClearanceField,

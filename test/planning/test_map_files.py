@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from images import pgm
 from PIL import Image
+from support.images import pgm
 
 from dubins_rrt_ros.planning.maps.files import load_map, save_map
 from dubins_rrt_ros.planning.maps.model import GridMap, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise

@@ -6,8 +6,8 @@ import warnings
 
 import numpy as np
 import pytest
-from images import chunks_of, palette, pgm, png, png_of, row_of, saved
 from PIL import Image
+from support.images import chunks_of, palette, pgm, png, png_of, row_of, saved
 
 from dubins_rrt_ros.planning.maps.images import read_image
 from dubins_rrt_ros.planning.maps.model import MapError

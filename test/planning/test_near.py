@@ -3,10 +3,10 @@
 import math
 from itertools import repeat
 
-import naive
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
+from support import naive
+from support.cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, Tree, Vehicle
 from dubins_rrt_ros.planning._kernels.grow import Grower

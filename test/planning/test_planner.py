@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 import shapely
-from cases import empty_map, needs_compiled, scaled
-from planner_cases import GOAL, START, VEHICLE, assert_refused, settings, walled
+from support.cases import empty_map, needs_compiled, scaled
+from support.planner_cases import GOAL, START, VEHICLE, assert_refused, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Status, Vehicle, audit_path, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
@@ -219,7 +219,7 @@ def test_a_path_that_fails_the_audit_is_a_defect_and_not_a_path(planner, monkeyp
     def strict(path, problem):
         return audit_path(path, Problem(problem.map, Vehicle(0.5, 5.0), problem.start, problem.goal))
 
-    monkeypatch.setattr(module, "audit", strict)
+    monkeypatch.setattr(module, "audit_path", strict)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))
     assert result.status == Status.UNKNOWN
     assert result.path is None

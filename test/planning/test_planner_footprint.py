@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from cases import SCALE, needs_compiled
+from support.cases import SCALE, needs_compiled
 
 from dubins_rrt_ros.planning import (
     ClearanceField,

@@ -4,8 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from cases import SCALE, empty_map
-from planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
+from support.cases import SCALE, empty_map
+from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit_path, plan, prepare
 from dubins_rrt_ros.planning.search.smoothing import polished
@@ -114,7 +114,7 @@ def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monke
 
 
 def test_cancelled_while_the_clearance_field_was_computed(planner, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.reasons", None)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.explain", None)
     asked = []
     result = plan(Problem(walled(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: asked.append(1) or len(asked) == 2)
     assert_refused(result, Status.CANCELLED)

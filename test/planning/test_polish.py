@@ -2,10 +2,10 @@
 
 import math
 
-import naive
 import numpy as np
 import pytest
-from cases import (
+from support import naive
+from support.cases import (
     SCALE,
     chain_of,
     chain_over,

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from cases import SCALE, random_maps, random_problem, scaled
-from naive import drive, points_along
+from support.cases import SCALE, random_maps, random_problem, scaled
+from support.naive import drive, points_along
 
 from dubins_rrt_ros.planning import ClearanceField, Settings, Status, audit_path, plan
 

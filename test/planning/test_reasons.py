@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from cases import SCALE, boxes_grid, empty_map, holed_polygons, maze_grid, naive_clearance
-from naive import are_connected, free_space
+from support.cases import SCALE, boxes_grid, empty_map, holed_polygons, maze_grid, naive_clearance
+from support.naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import (
     ClearanceField,

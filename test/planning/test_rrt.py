@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
+from support.cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map
 from dubins_rrt_ros.planning.curves.dubins import shortest

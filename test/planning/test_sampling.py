@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, chain_over, empty_map, field_of, holed_polygons, maze_grid, scaled, search_on
+from support.cases import SCALE, boxes_grid, chain_over, empty_map, field_of, holed_polygons, maze_grid, scaled, search_on
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle
 from dubins_rrt_ros.planning.search import rrt, sampling

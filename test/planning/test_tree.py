@@ -3,10 +3,10 @@
 import math
 from dataclasses import replace
 
-import naive
 import numpy as np
 import pytest
-from cases import SCALE, boxes_grid, finish, free_pose, holed_polygons, naive_clearance, scaled, search_on
+from support import naive
+from support.cases import SCALE, boxes_grid, finish, free_pose, holed_polygons, naive_clearance, scaled, search_on
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Settings, Tree, TreeError, Vehicle
 

@@ -4,12 +4,12 @@ import math
 import re
 from dataclasses import replace
 
-import naive
 import numpy as np
 import pytest
 import shapely
-from cases import SCALE, boxes_grid, holed_polygons, naive_clearance, scaled
-from naive import are_connected, free_space
+from support import naive
+from support.cases import SCALE, boxes_grid, holed_polygons, naive_clearance, scaled
+from support.naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
 from dubins_rrt_ros.planning._kernels.widest import Flood

@@ -6,7 +6,6 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path as FilePath
 
-import naive
 import numpy as np
 import pytest
 import shapely
@@ -16,6 +15,7 @@ from dubins_rrt_ros.planning.curves.chain import Chain
 from dubins_rrt_ros.planning.curves.dubins import WORDS, DubinsCurve, shortest
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
 from dubins_rrt_ros.planning.search.rrt import Search
+from support import naive
 
 #: By how much the budgets of the tests shrink where the kernels are interpreted, some fifty times slower.
 SCALE = 1 if kernels_compiled else 20

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from harness import Client, poses_of, values_of
 from nav_msgs.srv import GetMap, LoadMap
 from std_srvs.srv import Trigger
 
@@ -30,6 +29,7 @@ from dubins_rrt_ros.planning import (
     options,
 )
 from dubins_rrt_ros.planning.maps.locate import find_map
+from support.harness import Client, poses_of, values_of
 
 #: The package's own maps, both kinds; and what load_map refuses.
 OWN_MAPS = [f"{name}.{ending}" for name in ("block", "forest", "maze") for ending in ("yaml", "geojson")]

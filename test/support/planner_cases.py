@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from cases import scaled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle
+from support.cases import scaled
 
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
 VEHICLE = Vehicle(0.5, 0.2)

@@ -1,0 +1,1 @@
+"""What tests share: naive twins of the kernels, maps and problems, and planner processes with their clients."""
