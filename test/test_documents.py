@@ -19,6 +19,7 @@ from urllib.parse import unquote
 
 import pytest
 from support.cases import needs_compiled
+from support.domains import claim_domain
 
 import dubins_rrt_ros
 
@@ -90,7 +91,7 @@ def environment(tmp_path_factory):
         "PATH": extended("PATH", commands, Path(sys.executable).parent),
         "PYTHONPATH": extended("PYTHONPATH", Path(dubins_rrt_ros.__file__).parent.parent), "PYTHONSAFEPATH": "1",
         "MPLBACKEND": "Agg", "ROS_LOG_DIR": str(tmp_path_factory.mktemp("log")),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(1 + (os.getpid() + 50) % 101)}
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(claim_domain())}
 
 
 def extended(variable, *folders):

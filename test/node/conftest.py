@@ -3,12 +3,12 @@
 import os
 
 import pytest
+from support.domains import claim_domain
 
 # Before rclpy is imported: a field of the wrong type is an error, and nobody else hears us.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-# Domains up to 101 have ports that the system gives to nobody else.
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
+os.environ["ROS_DOMAIN_ID"] = str(claim_domain())
 
 #: Fast DDS announces a participant five times at 0.1 s; who is not there yet waits for seconds.
 EAGER_DISCOVERY = """<?xml version="1.0" encoding="UTF-8"?>

@@ -93,15 +93,13 @@ def test_a_goal_that_is_refused_replaces_the_one_before(talk):
 
 def test_improvements_have_one_plan_id_and_rising_revisions_and_the_last_is_told(talk):
     talk = talk(samples=4000, planning_time=15.0, seed=1)
-    last = talk.goal(GOAL, samples="4000")
+    talk.goal(GOAL, samples="4000")
     told = [values_of(status) for status in talk.client.statuses]
     assert {item["plan_id"] for item in told} == {"1"}
     assert [int(item["revision"]) for item in told] == list(range(1, len(told) + 1))
     lengths = [float(item["path_length"]) for item in told]
     assert len(told) > 1
     assert lengths == sorted(lengths, reverse=True)
-    # The first and the last come at once, those between them at most ten times a second.
-    assert len(told) <= 12 * float(last["planning_time"]) + 2
     talk.client.wait_for(lambda: len(talk.client.paths) == len(told), "a path with every status")
     assert is_of(talk.client.statuses[-1], talk.client.paths[-1])
 

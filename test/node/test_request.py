@@ -129,6 +129,13 @@ def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, m
         request.serve(pytest.fail, never)
 
 
+def test_improvements_are_not_reported_before_the_interval_is_over(request_for, clock):
+    reported = []
+    answer = request_for(samples=300, planning_time=60.0, seed=1).serve(reported.append, never)  # while the clock stands still
+    assert len(reported) == 1
+    assert answer.length < reported[0].length
+
+
 def test_the_throttle_lets_the_first_improvement_pass_at_once(clock):
     throttle = _Throttle(IMPROVEMENT_INTERVAL)
     assert not throttle.lets_pass(False)
