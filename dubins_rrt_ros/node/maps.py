@@ -1,9 +1,9 @@
 """The map that is planned on: from a file, from the topic, or by service."""
 
 import queue
-import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from concurrent import futures
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,17 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 
-from dubins_rrt_ros.planning import GridMap, Map, MapError, MapMetadataError, MapNotFound, Vehicle, load_map, prepare
+from dubins_rrt_ros.planning import (
+    GridMap,
+    Map,
+    MapError,
+    MapMetadataError,
+    MapNotFound,
+    Vehicle,
+    World,
+    load_map,
+    prepare,
+)
 from dubins_rrt_ros.planning.collision.footprint import summary
 from dubins_rrt_ros.planning.maps.locate import find_map
 
@@ -42,17 +52,17 @@ class Preparation:
 
     Attributes:
         map, inner_radius, allow_unknown: what it is for.
-        previous: a map that was prepared before, from which what did not change is taken over; None once it is computed, so
+        previous: a world that was prepared before, from which what did not change is taken over; None once this one is there, so
             that it is not kept alive any longer.
-        done: set when it is computed.
+        world: what is prepared; cancelled where that was not needed any more.
         is_wanted: whether a request waits for it, which it does not any more once there is a newer map.
     """
 
     map: Map
     inner_radius: float
     allow_unknown: bool
-    previous: Map | None
-    done: threading.Event
+    previous: World | None
+    world: "futures.Future[World]" = field(default_factory=futures.Future)
     is_wanted: bool = False
 
 
@@ -108,7 +118,7 @@ class Maps:
     @property
     def is_prepared(self) -> bool:
         """Whether requests can be planned on the current map without delay."""
-        return self.current is not None and self.prepared().done.is_set()
+        return self.current is not None and self.prepared().world.done()
 
     def prepared(self) -> Preparation:
         """The preparation of the current map for the present vehicle, begun if it was not."""
@@ -116,7 +126,7 @@ class Maps:
         wanted = self.current.map, now.vehicle.inner_radius, now.problem["allow_unknown"]
         last = self._preparation
         if last is None or (last.map, last.inner_radius, last.allow_unknown) != wanted:
-            self._preparation = Preparation(*wanted, _prepared_before(last), threading.Event())
+            self._preparation = Preparation(*wanted, _prepared_before(last))
             self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
         return self._preparation
 
@@ -165,10 +175,13 @@ class Maps:
         try:
             if preparation.is_wanted or preparation.map is self.current.map:
                 preparation.map.id  # noqa: B018 - of a large map it takes long, and is kept
-                prepare(preparation.map, vehicle, preparation.allow_unknown, preparation.previous)
+                preparation.world.set_result(prepare(preparation.map, vehicle, preparation.allow_unknown, preparation.previous))
+        except Exception as error:
+            preparation.world.set_exception(error)  # which a request says
+            raise
         finally:
             preparation.previous = None
-            preparation.done.set()  # also where it failed, which plan() then says of the request
+            preparation.world.cancel()  # where it was left out
         return preparation
 
     def _on_prepared(self, outcome: Preparation | Exception) -> None:
@@ -210,11 +223,11 @@ class Maps:
         return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
 
 
-def _prepared_before(last: Preparation | None) -> Map | None:
-    """The newest map that is prepared, as far as the last preparation knows."""
-    if last is None:
-        return None
-    return last.map if last.done.is_set() else last.previous
+def _prepared_before(last: Preparation | None) -> World | None:
+    """The newest world that is prepared, as far as the last preparation knows."""
+    if last is None or not last.world.done():
+        return None if last is None else last.previous
+    return None if last.world.cancelled() or last.world.exception() else last.world.result()
 
 
 def _within(timeout: float, results: queue.SimpleQueue) -> Any:

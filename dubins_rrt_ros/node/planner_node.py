@@ -191,7 +191,7 @@ class PlannerNode(Node):
             if self._start is None:
                 raise Refusal(Status.NO_START, f"There is no start to plan from: {self._no_start()}")
             request = self._request(self._goal_id, self._start, self._frames.pose("goal", self._goal))
-            if not request.prepared.is_set():
+            if not request.world.done():
                 self.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
             self._is_planning = True
             self._submit(self._goal_worker, request, self._end_goal, self._improve_goal)
@@ -201,7 +201,7 @@ class PlannerNode(Node):
         problem = Problem(used.map, now.vehicle, start, goal, **{**now.problem, **wanted})
         preparation = self._maps.prepared()
         preparation.is_wanted = True
-        return Request(plan_id, problem, now.settings, preparation.done, now.node.check_invariants)
+        return Request(plan_id, problem, now.settings, preparation.world, now.node.check_invariants)
 
     def _submit(self, worker: Worker, request: Request, ended: Callable, improved: Callable | None = None) -> Future:
         """Have a request served; the future's result, which `ended` is called with too, says how it ended."""

@@ -1,11 +1,11 @@
 """A request to the planner, as a job for a worker. It knows nothing of ROS."""
 
-import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from concurrent.futures import Future, wait
+from dataclasses import dataclass, replace
 
-from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, plan
+from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan
 
 #: Improvements of a path are reported at most once in this time [s].
 IMPROVEMENT_INTERVAL = 0.1
@@ -28,14 +28,14 @@ class Request:
     Attributes:
         id: the plan_id of its answers.
         problem, settings: what plan() takes.
-        prepared: set once the clearance of the problem's map is computed.
+        world: the problem's map, prepared.
         check_invariants: whether every answer is checked, the improvements too.
     """
 
     id: int
     problem: Problem
     settings: Settings
-    prepared: threading.Event
+    world: Future[World]
     check_invariants: bool = False
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
@@ -50,7 +50,7 @@ class Request:
             Refusal: it was cancelled before it was begun.
             PlanError, PathError, TreeError: an answer broke an invariant.
         """
-        self._await_map(cancelled)
+        problem = self._prepared_problem(cancelled)
         throttle = _Throttle(IMPROVEMENT_INTERVAL)
 
         def on_progress(progress: Progress) -> None:
@@ -59,18 +59,20 @@ class Request:
                 if snapshot.path is not None:
                     improved(self._checked(snapshot))
 
-        return self._checked(plan(self.problem, self.settings, cancel=cancelled, on_progress=on_progress))
+        return self._checked(plan(problem, self.settings, cancel=cancelled, on_progress=on_progress))
 
     def _checked(self, answer: Plan) -> Plan:
         if self.check_invariants:
             answer.check()
         return answer
 
-    def _await_map(self, cancelled: Callable[[], bool]) -> None:
-        while not self.prepared.wait(PREPARING_INTERVAL) and not cancelled():
+    def _prepared_problem(self, cancelled: Callable[[], bool]) -> Problem:
+        """The problem in its world, once that is there."""
+        while not cancelled() and wait([self.world], PREPARING_INTERVAL).not_done:
             pass
         if cancelled():
             raise Refusal(Status.CANCELLED, "Cancelled before a first path: the planner had not begun yet.")
+        return replace(self.problem, world=self.world.result().for_vehicle(self.problem.vehicle))
 
 
 class _Throttle:

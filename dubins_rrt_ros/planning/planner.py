@@ -10,19 +10,17 @@ import numpy as np
 
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
-from .collision.footprint import cover
 from .curves.path import Path
 from .diagnosis import explain
 from .diagnosis.bounds import lower_bound
-from .maps.model import Map
 from .problem import Problem
 from .result import Plan, Progress, Status
-from .search.cost_to_go import DistanceField, free_blocks
+from .search.cost_to_go import DistanceField
 from .search.headings import FOLLOW_FIELD
 from .search.rrt import Search
 from .search.tree import Tree
 from .settings import Settings
-from .vehicle import Vehicle
+from .world import World, prepare
 
 #: Progress is reported at least this often [s].
 REPORT_INTERVAL = 0.05
@@ -32,20 +30,6 @@ SAME = 1e-9
 LEAST_IMPROVEMENT = 1e-6
 #: A block of memory that is larger than any array of most requests [bytes].
 LARGE_BLOCK = 1 << 24
-
-
-def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: Map | None = None) -> None:
-    """Compute what depends on map and vehicle alone, so that requests need not wait for it: it is kept as long as the map.
-
-    Args:
-        previous: a map that was prepared before; where this one differs from it in a part, only that is computed.
-    """
-    _keep_freed_memory()
-    field = ClearanceField.of(map, allow_unknown, previous)
-    field.components(vehicle.inner_radius)
-    free_blocks(field, vehicle.inner_radius)
-    if vehicle.outline:
-        cover(vehicle.outline)
 
 
 @cache
@@ -67,7 +51,7 @@ def plan(problem: Problem, settings: Settings, *, cancel: Callable[[], bool] = l
     the search has found is shortened in a few milliseconds more, when it is cut short too.
 
     Args:
-        problem: what to plan.
+        problem: what to plan; where it has no world, its map is prepared first.
         settings: how to plan.
         cancel: asked at once, when the clearance field is ready, and about every 5 ms; True ends the search with the best
             path so far.
@@ -97,6 +81,7 @@ class _Request:
         self._time_to_first = None
         self._judged: Path | None = None  # by the audit, with this verdict:
         self._verdict: Audit | None = None
+        self._world: World | None = None
         self._map_time = 0.0
         self._started = time.perf_counter()
 
@@ -112,7 +97,8 @@ class _Request:
         """What plan() returns."""
         if cancel():
             return self._cancelled(self._root, 0)
-        field = self._prepared_field()
+        self._prepare()
+        field = self._world.field
         if cancel():
             return self._cancelled(self._root, 0)
         if reason := explain.before_search(self._problem, field):
@@ -122,12 +108,13 @@ class _Request:
             return self._audited(Path(self._problem.start, self._problem.start, ()), self._root, 0)
         return self._search(field, cancel, on_progress)
 
-    def _prepared_field(self) -> ClearanceField:
-        """The clearance field; the request's own time begins when it is there."""
+    def _prepare(self) -> None:
+        """Get the world ready, where the problem has none; the request's own time begins then."""
+        _keep_freed_memory()
         problem = self._problem
-        prepare(problem.map, problem.vehicle, problem.allow_unknown)
+        self._world = (problem.world if isinstance(problem.world, World)
+                       else prepare(problem.map, problem.vehicle, problem.allow_unknown))
         self._map_time, self._started = self._elapsed, time.perf_counter()
-        return ClearanceField.of(problem.map, problem.allow_unknown)
 
     def _search(self, field: ClearanceField, cancel: Callable[[], bool], on_progress: Callable[[Progress], None]) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
@@ -195,7 +182,7 @@ class _Request:
     def _audited(self, path: Path, tree: Tree, samples: int, *, cancelled: bool = False, running: bool = False) -> Plan:
         """The plan with a path, if the path passes the audit."""
         if self._judged is not path:  # an improvement that was reported is often the answer too
-            self._judged, self._verdict = path, audit_path(path, self._problem)
+            self._judged, self._verdict = path, audit_path(path, self._problem, self._world.obstacles)
         verdict = self._verdict
         if not verdict.ok:
             message = f"A defect in the planner: its path failed the audit: {'; '.join(verdict.findings)}. Please report it."

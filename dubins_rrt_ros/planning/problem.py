@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from .maps.model import Map
-from .option import convert_options, option
+from .option import OptionError, convert_options, option
 from .text import quoted
 from .vehicle import Vehicle
 
@@ -20,18 +21,32 @@ class InvalidPose(ValueError):
     """A pose that is none; the message says which and why."""
 
 
-@dataclass(frozen=True, eq=False)
+class PreparedMap(Protocol):
+    """What a problem wants to know of a `World`."""
+
+    @property
+    def map(self) -> Map: ...
+
+    @property
+    def vehicle(self) -> Vehicle: ...
+
+    @property
+    def allow_unknown(self) -> bool: ...
+
+
+@dataclass(frozen=True, eq=False, init=False)
 class Problem:
-    """One request to the planner.
+    """One request to the planner: `Problem(map, vehicle, start, goal)`, or `Problem(world, start=..., goal=...)`.
 
     Attributes:
         map: free and occupied space.
         vehicle: turning radius and size.
         start, goal: (x [m], y [m], theta [rad]) in the map's frame.
+        world: the map as `prepare` made it ready for the vehicle, or None: then plan() does that first.
 
     Raises:
         InvalidPose: a pose has not three finite numbers.
-        OptionError: a tolerance is of the wrong type or out of range.
+        OptionError: a tolerance is of the wrong type or out of range, or the world is prepared for something else.
     """
 
     map: Map
@@ -44,11 +59,25 @@ class Problem:
                                        low=0.0, high=math.pi)
     any_goal_heading: bool = option(False, "the path may end with any heading")
     allow_unknown: bool = option(False, "the vehicle may drive through unknown space")
+    world: PreparedMap | None = None
 
-    def __post_init__(self):
+    def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None, start: Sequence[float] = (),
+                 goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0, goal_tolerance_yaw: float = 0.0,
+                 any_goal_heading: bool = False, allow_unknown: bool = False, world: PreparedMap | None = None):
+        """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
+        if not isinstance(map, Map):
+            _check_fit(map, vehicle, allow_unknown)
+            map, vehicle, allow_unknown, world = map.map, map.vehicle, map.allow_unknown, map
+        if not isinstance(vehicle, Vehicle):
+            raise TypeError(f"the vehicle is {quoted(vehicle)}; give a Vehicle, or a World in place of map and vehicle")
+        if world is not None and (world.map, world.vehicle, world.allow_unknown) != (map, vehicle, allow_unknown):
+            world = None
+        given = {"map": map, "vehicle": vehicle, "start": checked_pose("start", start), "goal": checked_pose("goal", goal),
+                 "goal_tolerance_xy": goal_tolerance_xy, "goal_tolerance_yaw": goal_tolerance_yaw,
+                 "any_goal_heading": any_goal_heading, "allow_unknown": allow_unknown, "world": world}
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
         convert_options(self)
-        object.__setattr__(self, "start", checked_pose("start", self.start))
-        object.__setattr__(self, "goal", checked_pose("goal", self.goal))
 
     @property
     def yaw_tolerance(self) -> float:
@@ -59,6 +88,13 @@ class Problem:
     def exact_goal(self) -> bool:
         """Whether one pose alone is the goal."""
         return self.goal_tolerance_xy == 0 and self.yaw_tolerance == 0
+
+
+def _check_fit(world: PreparedMap, vehicle: Vehicle | None, allow_unknown: bool) -> None:
+    if vehicle is not None and vehicle != world.vehicle:
+        raise OptionError("the world is prepared for another vehicle; leave the vehicle out, or give world.for_vehicle(vehicle)")
+    if allow_unknown and not world.allow_unknown:
+        raise OptionError("allow_unknown is true, but the world is prepared without it; prepare one with allow_unknown=True")
 
 
 def checked_pose(name: str, pose: Sequence[float]) -> Pose:

@@ -57,7 +57,7 @@ def test_the_walk_that_is_drawn_finds_the_curves_free_that_the_planner_finds_fre
     rng, found = np.random.default_rng(1), []
     for _ in range(20):
         map = random_map(rng)
-        field = ClearanceField.of(map)
+        field = ClearanceField(map)
         corners = map.corners()
         for points in corners[0] + rng.random((10, 2, 2)) @ (corners[[1, 3]] - corners[0]):
             start, goal = ((*point, float(rng.uniform(-4, 4))) for point in points.tolist())

@@ -74,7 +74,7 @@ def test_the_cost_to_go_is_drawn_where_the_vehicle_fits_in_the_colours_of_its_ba
     rows, columns = image.get_array().shape
     assert (left, right, low, high) == pytest.approx((0, 15, 0, 12))
     x, y = np.meshgrid(left + (np.arange(columns) + 0.5) * right / columns, low + (np.arange(rows) + 0.5) * high / rows)
-    clearance = ClearanceField.of(problem.map).at(np.stack([x, y], axis=-1))
+    clearance = ClearanceField(problem.map).at(np.stack([x, y], axis=-1))
     hidden = np.ma.getmaskarray(image.get_array())
     assert not hidden[clearance >= problem.vehicle.robot_radius].any() and hidden[clearance == 0].all()
     straight = np.hypot(x - problem.goal[0], y - problem.goal[1])

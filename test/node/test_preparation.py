@@ -18,7 +18,7 @@ from dubins_rrt_ros.node import maps as module
 from dubins_rrt_ros.node.mailbox import Mailbox
 from dubins_rrt_ros.node.maps import Maps
 from dubins_rrt_ros.node.parameters import Parameters
-from dubins_rrt_ros.planning import GridMap
+from dubins_rrt_ros.planning import GridMap, prepare
 
 SOON = 10.0
 
@@ -38,7 +38,8 @@ class Keeper:
         self.made = []
 
     def prepare(self, map, vehicle, allow_unknown, previous):
-        self.made.append((map.name, previous and previous.name))
+        self.made.append((map.name, previous and previous.map.name))
+        return prepare(map, vehicle, allow_unknown, previous)
 
     def take(self, name):
         """Take a map; a weak reference to it."""

@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from dubins_rrt_ros.node import request as module
 from dubins_rrt_ros.node.request import IMPROVEMENT_INTERVAL, Refusal, Request, _Throttle
-from dubins_rrt_ros.planning import GridMap, PlanError, Problem, Progress, Settings, Status, Vehicle, plan
+from dubins_rrt_ros.planning import GridMap, PlanError, Problem, Progress, Settings, Status, Vehicle, plan, prepare
 
 ENDLESS = {"samples": 10_000_000, "planning_time": 600.0, "seed": 1}
 
@@ -25,10 +26,14 @@ def problem():
 def request_for(problem):
     """A function that makes a request whose map is prepared."""
     def make(wanted=problem, **settings):
-        prepared = threading.Event()
-        prepared.set()
-        return Request(1, wanted, Settings(**settings), prepared)
+        return Request(1, wanted, Settings(**settings), in_future(prepare(wanted.map, wanted.vehicle)))
     return make
+
+
+def in_future(world):
+    future = Future()
+    future.set_result(world)
+    return future
 
 
 @pytest.fixture
@@ -74,7 +79,7 @@ def test_a_request_that_was_cancelled_before_is_not_planned(request_for):
 
 
 def test_a_request_waits_until_its_map_is_prepared(problem):
-    prepared, waiting = threading.Event(), threading.Event()
+    world, waiting = Future(), threading.Event()
     answers = []
 
     def not_cancelled():
@@ -82,11 +87,11 @@ def test_a_request_waits_until_its_map_is_prepared(problem):
         return False
 
     serving = threading.Thread(target=lambda: answers.append(
-        Request(1, problem, Settings(samples=100, planning_time=60.0, seed=1), prepared).serve(lambda plan: None, not_cancelled)))
+        Request(1, problem, Settings(samples=100, planning_time=60.0, seed=1), world).serve(lambda plan: None, not_cancelled)))
     serving.start()
     assert waiting.wait(5.0)
     assert answers == []
-    prepared.set()
+    world.set_result(prepare(problem.map, problem.vehicle))
     serving.join(60.0)
     assert answers[0].status is Status.NONE
 
@@ -94,7 +99,7 @@ def test_a_request_waits_until_its_map_is_prepared(problem):
 def test_a_request_can_be_cancelled_while_its_map_is_prepared(problem):
     asked = itertools.count()
     with pytest.raises(Refusal) as refusal:
-        Request(1, problem, Settings(), threading.Event()).serve(pytest.fail, lambda: next(asked) > 2)
+        Request(1, problem, Settings(), Future()).serve(pytest.fail, lambda: next(asked) > 2)
     assert refusal.value.status is Status.CANCELLED
 
 

@@ -75,7 +75,7 @@ def random_curves(rng, map, clearance, radius, count):
 def test_curves_and_poses_as_brute_force_sees_them(kind, outline):
     rng = np.random.default_rng(sum(map(ord, kind + outline)))
     map_ = MAPS[kind](rng)
-    field, clearance, blocked = ClearanceField.of(map_), naive_clearance(map_), obstacles(map_)
+    field, clearance, blocked = ClearanceField(map_), naive_clearance(map_), obstacles(map_)
     shapely.prepare(blocked)
     vehicle = Vehicle(turning_radius=float(rng.uniform(1, 3)), footprint=OUTLINES[outline])
     fastest = 1 + vehicle.robot_radius / vehicle.turning_radius
@@ -105,7 +105,7 @@ def test_a_gap_that_just_passes_and_just_fails(gap, yaw):
         for map in polygons, grid:
             through = DubinsCurve((-2.2 * c, -2.2 * s, yaw), 1.0, "LSL", (0.0, 4.4, 0.0))
             # A grid's walls are longer; the vehicle is between them from first to last then.
-            assert ClearanceField.of(map).curve_is_free(through, vehicle) == fits
+            assert ClearanceField(map).curve_is_free(through, vehicle) == fits
 
 
 @pytest.mark.parametrize("swing", ["outer front", "inner side"])
@@ -132,7 +132,7 @@ def test_a_turn_past_a_post(kind, gap, fits, turn, swing):
         ahead, beside = np.array([math.cos(bearing), math.sin(bearing)]), np.array([-math.sin(bearing), math.cos(bearing)])
         post = shapely.Polygon([corner, corner + 0.02 * ahead + 0.002 * beside, corner + 0.02 * ahead - 0.002 * beside])
         map = PolygonMap(shapely.box(-15, -15, 15, 15) - post)
-    assert ClearanceField.of(map).curve_is_free(curve, vehicle) == fits
+    assert ClearanceField(map).curve_is_free(curve, vehicle) == fits
 
 
 def test_what_lies_within_the_outline_is_touched():
@@ -141,7 +141,7 @@ def test_what_lies_within_the_outline_is_touched():
     post = shapely.box(4.3, 0.1, 4.4, 0.2)
     ring = shapely.box(-30, -30, 30, 30) - (shapely.box(-20, -20, 20, 20) - shapely.box(-19, -19, -18, -18))
     for map in PolygonMap(shapely.box(-20, -20, 20, 20) - post), PolygonMap(ring):
-        field = ClearanceField.of(map)
+        field = ClearanceField(map)
         assert not field.pose_is_free((0.0, 0.0, 0.0), bus)
         assert not field.curve_is_free(DubinsCurve((0.0, 0.0, 0.0), 1.0, "LSL", (0.0, 0.01, 0.0)), bus)
 
@@ -149,6 +149,6 @@ def test_what_lies_within_the_outline_is_touched():
 def test_a_notch_goes_round_a_post():
     vehicle = Vehicle(footprint=OUTLINES["fork"])
     map = PolygonMap(shapely.box(-5, -5, 8, 5) - shapely.box(3, -0.1, 3.2, 0.1))
-    field = ClearanceField.of(map)
+    field = ClearanceField(map)
     assert field.curve_is_free(DubinsCurve((0.0, 0.0, 0.0), 1.0, "LSL", (0.0, 2.49, 0.0)), vehicle)
     assert not field.curve_is_free(DubinsCurve((0.0, 0.0, 0.0), 1.0, "LSL", (0.0, 2.51, 0.0)), vehicle)

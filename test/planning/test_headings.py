@@ -29,7 +29,7 @@ KINDS = ("uniform", "goal", "field", "mixed")
 
 def goal_field(map, goal, vehicle, **options):
     problem = Problem(map, vehicle, (*goal, 0.0), (*goal, 0.0), **options)
-    return DistanceField.to_goal(problem, ClearanceField.of(map))
+    return DistanceField.to_goal(problem, ClearanceField(map))
 
 
 def follow(field, point, goal, steps):
@@ -105,7 +105,7 @@ def test_headings_are_uniform_where_the_goal_is_not_reached(kind):
 def test_mixed_headings_are_uniform_by_a_fixed_share_and_else_near_the_field():
     problem = walled()
     poses = drawn(problem, heading_sampling="mixed")
-    led = DistanceField.to_goal(problem, ClearanceField.of(problem.map)).headings(poses[:, :2])
+    led = DistanceField.to_goal(problem, ClearanceField(problem.map)).headings(poses[:, :2])
     off = np.abs(np.remainder(poses[:, 2] - led + math.pi, math.tau) - math.pi)[np.isfinite(led)]
     assert len(off) > 1500
     opposite = (off > math.pi / 2).mean()

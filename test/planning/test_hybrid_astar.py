@@ -233,7 +233,7 @@ def test_a_start_in_the_corner_of_the_lattice_with_a_heading_many_turns_below_0(
 
 def test_the_distances_that_guide_it_are_not_changed():
     problem = walled()
-    field = ClearanceField.of(problem.map)
+    field = ClearanceField(problem.map)
     to_goal = DistanceField.to_goal(problem, field)
     before = to_goal.kernel.nodes().tobytes()
     HybridAStarRuns(problem, Settings(seed=1), field, to_goal).run(2000, None)

@@ -98,7 +98,7 @@ def test_cancelled_answers_hold(asked):
 @pytest.mark.parametrize("seed", range(PROBLEMS))
 def test_polished_paths_hold(seed):
     rng = np.random.default_rng(seed)
-    field = ClearanceField.of(empty_map(40.0))
+    field = ClearanceField(empty_map(40.0))
     chain = chain_over([random_pose(rng) for _ in range(5)], VEHICLE.turning_radius)
     for fresh in (True, False):
         chain = polished(chain, VEHICLE, field, rng, fresh)

@@ -24,7 +24,7 @@ class Inner:
     """The inner loop on a map, one sample at a time."""
 
     def __init__(self, map, root, radius, step=0.0):
-        self.field = ClearanceField.of(map)
+        self.field = ClearanceField(map)
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.grown = SearchTree(root, radius, low, high - low)
@@ -64,7 +64,7 @@ MAPS = [empty_map(), empty_map(6.0), boxes_grid(np.random.default_rng(2), boxes=
 
 
 def first_free_pose(map):
-    field = ClearanceField.of(map)
+    field = ClearanceField(map)
     return tuple(next(pose for pose in samples_on(map, 100, seed=9) if field.at(pose[:2]) > 2 * NEED).tolist())
 
 

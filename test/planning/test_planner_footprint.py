@@ -31,7 +31,7 @@ def checked(problem, **settings):
     """The plan, its path judged again and its tree's edges with it."""
     result = plan(problem, Settings(**{"samples": SAMPLES, "seed": 1, "planning_time": 60.0, **settings}))
     result.check()
-    result.tree.check(ClearanceField.of(problem.map, problem.allow_unknown), problem.vehicle)
+    result.tree.check(ClearanceField(problem.map, problem.allow_unknown), problem.vehicle)
     if result.path:
         assert audit_path(result.path, problem).ok
     return result

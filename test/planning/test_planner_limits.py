@@ -107,7 +107,7 @@ def test_cancelled_while_hybrid_a_star_seeks_the_first_path(planner):
 
 
 def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.ClearanceField", None)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.prepare", None)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: True)
     assert_refused(result, Status.CANCELLED, "Cancelled before a first path: 0 of", "samples drawn, 1 tree node, ")
     assert (result.samples, len(result.tree), result.map_time) == (0, 1, 0.0)
@@ -122,15 +122,14 @@ def test_cancelled_while_the_clearance_field_was_computed(planner, monkeypatch):
 
 
 def test_prepare_does_what_does_not_depend_on_the_request(monkeypatch):
-    from dubins_rrt_ros.planning import ClearanceField
     from dubins_rrt_ros.planning.collision import clearance as module
 
-    map = walled(-1)
-    prepare(map, VEHICLE, allow_unknown=True)
-    monkeypatch.setattr(module, "_grid_parts", None)
+    world = prepare(walled(-1), VEHICLE, allow_unknown=True)
+    for name in ("_grid_parts", "free_squares"):
+        monkeypatch.setattr(module, name, None)
     monkeypatch.setattr(module.ndimage, "label", None)
-    assert ClearanceField.of(map, True).components(VEHICLE.robot_radius).max() == 1
-    result = plan(Problem(map, VEHICLE, START, GOAL, allow_unknown=True), settings("rrt_star", samples=1))
+    assert world.field.components(VEHICLE.robot_radius).max() == 1
+    result = plan(Problem(world, start=START, goal=GOAL), settings("rrt_star", samples=1))
     assert result.map_time < 0.01
 
 

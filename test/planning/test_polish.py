@@ -96,7 +96,7 @@ def test_a_path_is_polished_by_the_rng_alone():
 
 def test_the_numbers_drawn_do_not_depend_on_the_path():
     """So that what is drawn after it is not changed by where the search stood."""
-    field, short = ClearanceField.of(empty_map()), chain_over([(-8.0, -8.0, 0.0), (8.0, 8.0, 0.0)], 0.5)
+    field, short = ClearanceField(empty_map()), chain_over([(-8.0, -8.0, 0.0), (8.0, 8.0, 0.0)], 0.5)
     states = []
     for chain in (short, chain_over([(-8.0, -8.0, 0.0), (0.0, 5.0, 3.0), (3.0, -5.0, 3.0), (8.0, 8.0, 0.0)], 0.5)):
         rng = np.random.default_rng(1)
@@ -112,7 +112,7 @@ def test_a_loop_on_an_open_field_becomes_the_dubins_curve():
     direct = dubins.shortest(start, goal, 0.5).length
     assert chain.length > 1.5 * direct
     for seed in range(scaled(20)):
-        shorter, lengths = polish(chain, VEHICLE, ClearanceField.of(empty_map()), times=6, seed=seed)
+        shorter, lengths = polish(chain, VEHICLE, ClearanceField(empty_map()), times=6, seed=seed)
         assert shorter.length == pytest.approx(direct, abs=1e-6)
         assert lengths[-1] >= direct - 1e-9
         assert tuple(shorter.poses[0]) == start
@@ -121,7 +121,7 @@ def test_a_loop_on_an_open_field_becomes_the_dubins_curve():
 
 def test_the_shortest_path_stays():
     chain = chain_over([(-8.0, -8.0, 0.5), (8.0, 8.0, 2.0)], 0.5)
-    shorter, _ = polish(chain, VEHICLE, ClearanceField.of(empty_map()), times=3)
+    shorter, _ = polish(chain, VEHICLE, ClearanceField(empty_map()), times=3)
     assert [array[1:].tobytes() for array in shorter] == [array[1:].tobytes() for array in chain]
 
 
@@ -169,7 +169,7 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
 @pytest.mark.parametrize("seed", range(3))
 def test_poses_that_come_twice_and_curves_of_no_length(poses, seed):
     chain = chain_over(poses, 0.5)
-    shorter, lengths = polish(chain, VEHICLE, ClearanceField.of(empty_map()), times=3, seed=seed)
+    shorter, lengths = polish(chain, VEHICLE, ClearanceField(empty_map()), times=3, seed=seed)
     assert (np.diff(lengths) <= 1e-9).all()
     assert shorter.poses[[0, -1]].tobytes() == chain.poses[[0, -1]].tobytes()
     assert shorter.length == pytest.approx(dubins.shortest(poses[0], poses[-1], 0.5).length, abs=1e-6)
@@ -185,7 +185,7 @@ def test_a_path_of_thousands_of_curves():
     poses = [(float(a), float(b), float(c)) for a, b, c in zip(x, np.sin(x), np.arctan(np.cos(x)), strict=True)]
     chain = chain_over(poses, 0.5)
     assert len(chain.words) == len(poses)
-    shorter, _ = polish(chain, VEHICLE, ClearanceField.of(empty_map()), times=4)
+    shorter, _ = polish(chain, VEHICLE, ClearanceField(empty_map()), times=4)
     direct = dubins.shortest(poses[0], poses[-1], 0.5).length
     assert direct - 1e-9 <= shorter.length < direct + 0.2 * (chain.length - direct)
     at = chain.poses[0]

@@ -27,7 +27,7 @@ def test_random_problems(planner):
         assert result.status in POSSIBLE, result.message
         assert result.message
         assert (result.status == Status.NONE) == (result.path is not None)
-        result.tree.check(ClearanceField.of(problem.map, problem.allow_unknown), problem.vehicle)
+        result.tree.check(ClearanceField(problem.map, problem.allow_unknown), problem.vehicle)
         if result.path is not None:
             check_path(result, clearance)
         statuses.append(result.status)

@@ -74,7 +74,7 @@ def test_too_narrow_a_gap_in_polygons_is_measured(gap):
     walls = shapely.union(shapely.box(-0.5, -11, 0.5, 3), shapely.box(-0.5, 3 + gap, 0.5, 11))
     problem = Problem(PolygonMap(shapely.box(-10, -10, 10, 10) - walls), Vehicle(0.5, 0.9), START, GOAL)
     result = why(problem)
-    spacing = lattice_spacing(problem.map, ClearanceField.of(problem.map))
+    spacing = lattice_spacing(problem.map, ClearanceField(problem.map))
     width, radius = map(float, re.search(r"is ([\d.]+) m wide .* radius ([\d.]+) m instead of 0.9 m", result.message).groups())
     assert gap - 2 * spacing < width <= gap + 0.005
     assert (width - spacing) / 2 - 0.02 < radius < gap / 2
@@ -107,7 +107,7 @@ def test_a_gap_narrower_than_the_lattice_is_bounded():
     problem = Problem(PolygonMap(shapely.box(-10, -10, 10, 10) - walls), Vehicle(0.5, 0.3), START, GOAL)
     result = why(problem)
     width = float(re.search(r"no way between start and goal is wider than ([\d.]+) m, and robot_radius is", result.message)[1])
-    assert 4 * lattice_spacing(problem.map, ClearanceField.of(problem.map)) <= width < 1
+    assert 4 * lattice_spacing(problem.map, ClearanceField(problem.map)) <= width < 1
     assert not are_connected(problem, width / 2)
     assert result.culprit is None
 
@@ -185,7 +185,7 @@ def test_large_grids_are_coarsened_to_the_safe_side(monkeypatch):
 def test_the_nearest_obstacle_is_the_nearest(make):
     rng = np.random.default_rng(7)
     map = make(rng)
-    field, corners, free = ClearanceField.of(map), map.corners(), free_space(map)
+    field, corners, free = ClearanceField(map), map.corners(), free_space(map)
     seen = set()
     for _ in range(200):
         point = tuple((corners[0] + rng.random(2) @ (corners[[1, 3]] - corners[0])).tolist())
@@ -240,7 +240,7 @@ def test_the_figures_of_an_occupied_goal_with_a_tolerance():
 def test_no_room_is_a_proof(tolerance):
     rng = np.random.default_rng(9)
     map = boxes_grid(rng, boxes=40)
-    field, clearance, corners = ClearanceField.of(map), naive_clearance(map), map.corners()
+    field, clearance, corners = ClearanceField(map), naive_clearance(map), map.corners()
     proved = 0
     for _ in range(100):
         point = corners[0] + rng.uniform(-0.1, 1.1, 2) @ (corners[[1, 3]] - corners[0])

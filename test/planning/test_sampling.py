@@ -77,7 +77,7 @@ def test_no_place_is_left_out_that_a_shorter_path_may_lead_over(never_near, kind
     """All that plain samples find below the length, informed ones come near to; and they lie in squares that reach below it."""
     rng = np.random.default_rng(3)
     map = {"grid": boxes_grid, "maze": maze_grid, "polygons": holed_polygons}[kind](rng)
-    field = ClearanceField.of(map)
+    field = ClearanceField(map)
     corners = map.corners()
     points = corners[0] + rng.random((400, 2)) @ (corners[[1, 3]] - corners[0])
     free = points[field.at(points) > 0.3]

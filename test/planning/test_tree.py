@@ -24,7 +24,7 @@ def problem_on(kind, seed=1):
 def grown(kind="grid", seed=1, **options):
     """A finished search and its field."""
     problem = problem_on(kind, seed)
-    field = ClearanceField.of(problem.map)
+    field = ClearanceField(problem.map)
     settings = Settings(**{"samples": scaled(1000, least=150), "seed": 1, **options})
     return finish(search_on(problem, settings)), field
 
@@ -37,7 +37,7 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
     batches = nodes = 0
     for seed in range(3 if SCALE == 1 else 1):
         problem = problem_on(kind, seed)
-        field = ClearanceField.of(problem.map)
+        field = ClearanceField(problem.map)
         settings = Settings(planner=planner, samples=scaled(1200, least=100), step_size=step_size, seed=seed, **options)
         search = search_on(problem, settings)
         while not search.done:

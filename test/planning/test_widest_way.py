@@ -33,7 +33,7 @@ def test_the_flood_finds_the_widest_way(seed):
     start, *targets = (tuple(at) for at in rng.integers(0, shape, (4, 2)).tolist())
     is_target = np.zeros(shape, np.int8)
     is_target[tuple(np.transpose(targets))] = 1
-    flood = Flood(ClearanceField.of(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least, enough)
+    flood = Flood(ClearanceField(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least, enough)
     found, way = flood.widest_way(start[0] * shape[1] + start[1])
     assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
     if found == 0:
@@ -65,7 +65,7 @@ def test_the_widest_way_is_as_wide_as_it_says_and_hardly_narrower_than_any():
     narrow = 0
     for _ in range(40 if SCALE == 1 else 8):
         problem = crowded_problem(rng)
-        field = ClearanceField.of(problem.map)
+        field = ClearanceField(problem.map)
         spacing = lattice_spacing(problem.map, field)
         way = widest_way(problem, field)
         if way is None:
@@ -92,7 +92,7 @@ def test_random_problems_have_true_reasons():
             anywhere = corners[0] + rng.uniform(-0.1, 1.1, 2) @ (corners[[1, 3]] - corners[0])
             problem = replace(problem, goal=(*anywhere.tolist(), 0.0))
         clearance = naive_clearance(problem.map)
-        field = ClearanceField.of(problem.map, problem.allow_unknown)
+        field = ClearanceField(problem.map, problem.allow_unknown)
         reason = before_search(problem, field)
         if reason is None:
             continue

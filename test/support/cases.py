@@ -2,7 +2,7 @@
 
 import importlib.util
 import math
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from pathlib import Path as FilePath
 
@@ -124,7 +124,12 @@ def empty_map(side=20.0):
 
 
 def field_of(problem):
-    return ClearanceField.of(problem.map, problem.allow_unknown)
+    return _field_of(problem.map, problem.allow_unknown)
+
+
+@lru_cache(maxsize=8)
+def _field_of(map, allow_unknown):
+    return ClearanceField(map, allow_unknown)
 
 
 def search_on(problem, settings):

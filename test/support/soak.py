@@ -290,7 +290,7 @@ class Soak:
         """A pose that is on the map most often, in half of the cases at the widest of some places, else anywhere."""
         corners = self._map.corners()
         places = corners[0] + self._rng.random((self._one_of([1, 8]), 2)) @ (corners[[1, 3]] - corners[0])
-        place = places[np.argmax(ClearanceField.of(self._map).at(places))]
+        place = places[np.argmax(ClearanceField(self._map).at(places))]
         pose = stamped((*place.tolist(), self._rng.uniform(-math.pi, math.pi)), self._one_of(["map"] * 20 + ["", "odom"]))
         match self._rng.integers(20):
             case 0:

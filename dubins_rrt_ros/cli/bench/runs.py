@@ -9,7 +9,7 @@ from functools import lru_cache
 from multiprocessing import active_children, get_context
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, load_map, plan, prepare
+from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, World, load_map, plan, prepare
 
 from ..common.flags import UsageError
 from .problems import Case
@@ -64,8 +64,8 @@ def measure(task: Task) -> dict[str, Any]:
     Raises:
         MapError: the map cannot be used.
     """
-    map, map_time = _loaded(task.case)
-    problem = Problem(map, task.case.vehicle, task.case.start, task.case.goal)
+    world, map_time = _loaded(task.case)
+    problem = Problem(world, start=task.case.start, goal=task.case.goal)
     trace = []
 
     def note(progress: Progress) -> None:
@@ -79,12 +79,11 @@ def measure(task: Task) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _loaded(case: Case) -> tuple[Map, float]:
-    """The case's map, ready to plan on, and how long that took [s]. The runs of a case follow each other: one map is kept."""
+def _loaded(case: Case) -> tuple[World, float]:
+    """The case's map, prepared, and how long that took [s]. The runs of a case follow each other: one world is kept."""
     begin = time.perf_counter()
-    map = load_map(case.map)
-    prepare(map, case.vehicle)
-    return map, time.perf_counter() - begin
+    world = prepare(load_map(case.map), case.vehicle)
+    return world, time.perf_counter() - begin
 
 
 def _line(task: Task, answer: Plan, trace: list[list[float]], map_time: float) -> dict[str, Any]:

@@ -11,7 +11,6 @@ import numpy as np
 import shapely
 
 from dubins_rrt_ros.planning import (
-    ClearanceField,
     DubinsCurve,
     GridMap,
     Map,
@@ -23,8 +22,10 @@ from dubins_rrt_ros.planning import (
     Status,
     Tree,
     TreeError,
+    World,
     audit_path,
     plan,
+    prepare,
     values,
 )
 from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_gap, pose_gaps
@@ -62,6 +63,8 @@ def judged(task: Task) -> dict[str, Any]:
     begin = time.perf_counter()
     try:
         trial = random_trial(*task)
+        world = prepare(trial.problem.map, trial.problem.vehicle, trial.problem.allow_unknown)
+        trial = replace(trial, problem=replace(trial.problem, world=world))
         line |= {"kind": trial.kind} | _described(trial)
         begin_of_work = time.process_time()
         answer = plan(trial.problem, trial.settings)
@@ -73,7 +76,7 @@ def judged(task: Task) -> dict[str, Any]:
         elif task.number % OTHERS == 1:
             findings += _of_another_way(trial, answer)
         curves = list(_random_curves(trial.problem, answer.tree, task))
-        findings += [finding for curve in curves for finding in _of_curve(trial.problem, curve)]
+        findings += [finding for curve in curves for finding in _of_curve(trial.problem, world, curve)]
         line |= {"edges": len(answer.tree) - 1, "curves": len(curves), "paths": int(answer.path is not None)}
     except Exception as error:  # whatever it is, the campaign has found it
         where = traceback.extract_tb(error.__traceback__)[-1]
@@ -207,9 +210,9 @@ def _random_curves(problem: Problem, tree: Tree, task: Task) -> Iterator[DubinsC
         yield shortest(*map(tuple, tree.poses[pair].tolist()), radius)
 
 
-def _of_curve(problem: Problem, curve: DubinsCurve) -> Iterator[str]:
+def _of_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator[str]:
     """What is wrong with the planner's verdict on a curve."""
-    free = ClearanceField.of(problem.map, problem.allow_unknown).curve_is_free(curve, problem.vehicle)
+    free = world.field.curve_is_free(curve, problem.vehicle)
     if free and (findings := audit_curves([curve], [curve.end], problem)):
         yield f"the planner holds {curve} to be free: {'; '.join(findings)}"
     if not free:

@@ -109,7 +109,7 @@ def _draw_arrow(axes: Axes, tail: tuple[float, float], tip: tuple[float, float],
 
 def collision_walk() -> Figure:
     """The walk by clearance along a curve."""
-    looks = walk(ClearanceField.of(ROOM), WALK, DISC.robot_radius)
+    looks = walk(ClearanceField(ROOM), WALK, DISC.robot_radius)
     exact = sum(look.is_exact for look in looks)
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.add_subplot()

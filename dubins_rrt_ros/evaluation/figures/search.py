@@ -174,7 +174,7 @@ def first_and_final() -> tuple[Plan, Plan]:
 
 def bounds_of(problem: Problem) -> Bounds:
     """The bounds of a problem, of known space alone."""
-    field = ClearanceField.of(problem.map)
+    field = ClearanceField(problem.map)
     to_goal, from_start = (make(problem, field).make_bound() for make in (DistanceField.to_goal, DistanceField.from_start))
     return Bounds(to_goal, from_start, lower_bound(problem, to_goal))
 

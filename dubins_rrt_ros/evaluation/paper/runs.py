@@ -153,9 +153,8 @@ def problem_in(environment: str) -> Problem:
     """The environment with the start and the goal that its file names, ready to plan in."""
     file = find_map(f"{environment}.geojson")
     poses = json.loads(file.read_text(encoding="utf-8"))
-    map, vehicle = load_map(file), Vehicle(TURNING_RADIUS, ROBOT_RADIUS)
-    prepare(map, vehicle)
-    return Problem(map, vehicle, poses["start"], poses["goal"])
+    world = prepare(load_map(file), Vehicle(TURNING_RADIUS, ROBOT_RADIUS))
+    return Problem(world, start=poses["start"], goal=poses["goal"])
 
 
 def _outcome_without_path(reach: float) -> Outcome:

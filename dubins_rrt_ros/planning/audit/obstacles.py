@@ -4,7 +4,6 @@ For a grid they are the squares of its blocked cells and what is outside of it, 
 """
 
 import math
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import shapely
@@ -54,7 +53,6 @@ class GridObstacles:
     """The squares of a grid's blocked cells, and what is outside the grid. Only cells near the points asked for are read."""
 
     def __init__(self, grid: GridMap, allow_unknown: bool):
-        # Not the grid itself: it would be kept alive by what is kept for as long as it lives.
         self._data, self._resolution, self._origin = grid.data, grid.resolution, grid.origin
         self._allow_unknown = allow_unknown
         self._windows: dict[tuple[int, complex], _Window] = {}
@@ -215,13 +213,8 @@ def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray) -> np.ndarray:
 
 
 Obstacles = GridObstacles | PolygonObstacles
-_obstacles: WeakKeyDictionary[Map, dict[bool, Obstacles]] = WeakKeyDictionary()
 
 
 def obstacles_of(map: Map, allow_unknown: bool) -> Obstacles:
-    """Kept as long as the map, for the next path on it."""
-    by_unknown = _obstacles.setdefault(map, {})
-    if allow_unknown not in by_unknown:
-        by_unknown[allow_unknown] = (GridObstacles(map, allow_unknown) if isinstance(map, GridMap)
-                                     else PolygonObstacles(map.free))
-    return by_unknown[allow_unknown]
+    """The obstacles of a map; they keep what they have read of it, for the next path on it."""
+    return GridObstacles(map, allow_unknown) if isinstance(map, GridMap) else PolygonObstacles(map.free)

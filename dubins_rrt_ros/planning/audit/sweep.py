@@ -67,15 +67,17 @@ class Arcs:
         return index, nth * size, size
 
 
-def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0) -> tuple[list[str], float]:
+def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacles: Obstacles | None = None
+                       ) -> tuple[list[str], float]:
     """What is wrong with the clearance along arcs, a sentence each, and the least clearance [m].
 
     Args:
         slack: how far the vehicle may be from where the arcs have it [m].
+        obstacles: those of the problem's map, where they are at hand.
     """
     vehicle = problem.vehicle
     need = slack + (TOUCH if vehicle.outline else max(vehicle.robot_radius, POINT))
-    least, (x, y), decided = _least_clearance(arcs, problem, need)
+    least, (x, y), decided = _least_clearance(arcs, problem, need, obstacles)
     findings = []
     if not decided:
         findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {need:g} m that it cannot be decided")
@@ -95,13 +97,13 @@ def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
 _Least = tuple[float, tuple[float, float], bool]
 
 
-def _least_clearance(arcs: Arcs, problem: Problem, need: float) -> _Least:
+def _least_clearance(arcs: Arcs, problem: Problem, need: float, obstacles: Obstacles | None) -> _Least:
     """The least clearance, where it is, and whether no piece can hide contact."""
     map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
     if not outline:
-        return _narrow_down(arcs, Disc(obstacles_of(map, unknown)), need)
+        return _narrow_down(arcs, Disc(obstacles or obstacles_of(map, unknown)), need)
     if not isinstance(map, GridMap):
-        return _narrow_down(arcs, Outline(outline, obstacles_of(map, unknown)), need)
+        return _narrow_down(arcs, Outline(outline, obstacles or obstacles_of(map, unknown)), need)
     reach = FIRST_CELLS * map.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)

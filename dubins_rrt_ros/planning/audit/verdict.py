@@ -11,6 +11,7 @@ import numpy as np
 
 from ..curves.path import Path
 from ..problem import Pose, Problem
+from .obstacles import Obstacles
 from .sweep import Arcs, clearance_findings
 
 #: How far a curve may end from where the next one begins [m, rad], and relatively how much tighter a turn may be.
@@ -38,12 +39,18 @@ class Audit:
         return not self.findings
 
 
-def audit_path(path: Path, problem: Problem) -> Audit:
-    """Judge a path of a problem: its ends, its joints, its turns and its clearance."""
+def audit_path(path: Path, problem: Problem, obstacles: Obstacles | None = None) -> Audit:
+    """Judge a path of a problem: its ends, its joints, its turns and its clearance.
+
+    Args:
+        path: what is to be driven.
+        problem: with the map, the vehicle and the ends.
+        obstacles: those of the problem's map, where they are at hand, such as a World's.
+    """
     if broken := broken_parts(path):
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = driven_arcs(path)
-    too_near, least = clearance_findings(arcs, problem)
+    too_near, least = clearance_findings(arcs, problem, obstacles=obstacles)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
                 *turn_findings(path, problem), *too_near)
     turning = [curve.radius for curve in path.curves if _turns(curve)]

@@ -6,8 +6,9 @@ quarter of MARGIN from them; a curve along which it keeps MARGIN (a disc) or sqr
 polygons, in double precision; nothing is rounded to cells.
 """
 
+import copy
 import math
-from weakref import WeakKeyDictionary
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -17,6 +18,7 @@ from .._kernels import COMPILED
 from .._kernels.body import Body, PolygonBody
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.distance import fill_columns, look_aside
+from .._kernels.field import free_squares
 from ..curves.dubins import WORDS, DubinsCurve
 from ..maps.model import GridMap, Map, PolygonMap
 from ..problem import Pose
@@ -29,8 +31,22 @@ MARGIN = 0.0005
 POLYGON_CELLS = 15_000
 #: So many columns at a time are searched for cells that a change reaches.
 STRIP = 64
+#: The side of a free square is at most this share of the required clearance, so that walls do not vanish between squares ...
+SQUARE_SHARE = 0.6
+#: ... unless that makes more squares than about this many.
+MAX_SQUARES = 270_000 if COMPILED else 4_000
 
-_fields: WeakKeyDictionary[Map, dict[bool, "ClearanceField"]] = WeakKeyDictionary()
+
+class FreeSquares(NamedTuple):
+    """Squares of the raster's cells that may hold a point with the required clearance.
+
+    Attributes:
+        cells: the side of a square in cells of the raster.
+        is_free: (rows, columns) of squares, with a row and a column more on each side.
+    """
+
+    cells: int
+    is_free: np.ndarray
 
 
 class ClearanceField:
@@ -41,24 +57,25 @@ class ClearanceField:
     """
 
     def __init__(self, map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
-        """Compute the field; `of` keeps one per map, and says what `previous` is for."""
+        """Compute the distances.
+
+        Where `previous` is the field of a grid of the same shape and resolution, only what depends on the cells that differ is
+        computed; the result is the same as without it, and the previous field stays as it is.
+        """
         is_grid = isinstance(map, GridMap)
         self.kernel, self._origin = _grid_parts(map, allow_unknown, previous) if is_grid else _polygon_parts(map)
         self._polygons = None if is_grid else map.free
+        self._forget()
+
+    def _forget(self) -> None:
         self._components: tuple[float, np.ndarray] | None = None
+        self._free_squares: tuple[float, FreeSquares] | None = None
 
-    @classmethod
-    def of(cls, map: Map, allow_unknown: bool = False, previous: Map | None = None) -> "ClearanceField":
-        """The field of a map, computed at the first call for as long as the map lives.
-
-        Where a `previous` grid of the same shape and resolution has a field, only what depends on the cells that differ is
-        computed; the field is the same as without it, and that of the previous grid stays as it is.
-        """
-        fields = _fields.setdefault(map, {})
-        if allow_unknown not in fields:
-            known = {} if previous is None else _fields.get(previous, {})
-            fields[allow_unknown] = cls(map, allow_unknown, known.get(allow_unknown))
-        return fields[allow_unknown]
+    def shared(self) -> "ClearanceField":
+        """The same distances for another vehicle, whose components and free squares it keeps apart from these."""
+        other = copy.copy(self)
+        other._forget()
+        return other
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """The exact clearance at (..., 2) points [m]; 0 in obstacles and outside the map."""
@@ -123,9 +140,22 @@ class ClearanceField:
             self._components = kept = need, ndimage.label(self.possibly_free(need), structure=np.ones((3, 3)))[0]
         return kept[1]
 
+    def free_squares(self, need: float) -> FreeSquares:
+        """The squares that may hold a point with a clearance of at least `need` [m]; kept for the last `need`."""
+        kept = self._free_squares
+        if kept is None or kept[0] != need:
+            cells = _cells_of_square(self.kernel.field.shape, SQUARE_SHARE * need / self.kernel.resolution)
+            self._free_squares = kept = need, FreeSquares(cells, free_squares(self.kernel, cells, need))
+        return kept[1]
+
     def _may_be_free(self, bounds: np.ndarray, need: float) -> np.ndarray:
         # The bound of a cell is at most two of its diagonals below the clearance of any point in it.
         return bounds >= max(0.0, need - 2 * math.sqrt(2) * self.kernel.resolution - 1e-6)
+
+
+def _cells_of_square(shape: tuple[int, int], wish: float) -> int:
+    """How many cells of the raster make a side of a free square."""
+    return max(1, math.floor(wish), math.ceil(math.sqrt(shape[0] * shape[1] / MAX_SQUARES)))
 
 
 def _rounded_down(values: np.ndarray) -> np.ndarray:
@@ -138,7 +168,8 @@ def _grid_parts(grid: GridMap, allow_unknown: bool,
     free, cell = ~grid.blocked(allow_unknown), grid.resolution
     if not COMPILED:
         aside, field = _by_scipy(free, cell)
-    elif previous is not None and (previous.kernel.field.shape, previous.kernel.resolution) == (free.shape, cell):
+    elif (previous is not None and isinstance(previous.kernel, GridClearance)
+          and (previous.kernel.field.shape, previous.kernel.resolution) == (free.shape, cell)):
         aside, field = _changed(previous.kernel, free)
     else:
         aside, field = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)

@@ -4,6 +4,7 @@ import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
@@ -117,6 +118,9 @@ class GridMap:
         """A short digest of the content."""
         return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin)).encode())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return GridMap, (self.data, self.resolution, self.origin, self.name)  # so that its cells are read-only again
+
 
 @dataclass(frozen=True, eq=False)
 class PolygonMap:
@@ -154,6 +158,9 @@ class PolygonMap:
     def id(self) -> str:
         """A short digest of the content."""
         return _digest(shapely.to_wkb(self.free, byte_order=1))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PolygonMap, (self.free, self.name)  # so that they are prepared for threads again
 
 
 Map = GridMap | PolygonMap

@@ -1,23 +1,15 @@
 """How far places are around obstacles from where the goal is reached, or from the start: no path of the vehicle is shorter."""
 
 import math
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .._kernels import COMPILED
-from .._kernels.field import CostField, free_squares
+from .._kernels.field import CostField
 from ..collision.clearance import ClearanceField
 from ..problem import Problem
 
-#: The side of a square is at most this share of the radius of the vehicle's disc, so that walls do not vanish between squares ...
-SIDE = 0.6
-#: ... unless that makes more squares than about this many.
-MOST_SQUARES = 270_000 if COMPILED else 4_000
 #: What the kernel gives where no way is.
 FAR = 1e300
-
-_squares: WeakKeyDictionary[ClearanceField, tuple[float, int, np.ndarray]] = WeakKeyDictionary()
 
 
 class DistanceField:
@@ -36,9 +28,9 @@ class DistanceField:
                  target: tuple[float, float] | None = None):
         """The distances to all within `tolerance` [m] of `source`, where the clearance is at least `need` [m]. Until `make_bound`
         they are found as far as asked, and those on the way to `target` first, if there is one."""
-        block, squares = free_blocks(field, need)
+        cells, squares = field.free_squares(need)
         self._field, self._free = field, squares
-        self.kernel = CostField(field.kernel, block, squares, source, tolerance, target)
+        self.kernel = CostField(field.kernel, cells, squares, source, tolerance, target)
 
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "DistanceField":
@@ -95,20 +87,3 @@ def _least_of_corners(nodes: np.ndarray) -> np.ndarray:
     """(rows - 1, columns - 1): the least of the costs of (rows, columns) nodes at the corners of each square."""
     lower = np.minimum(nodes[:, :-1], nodes[:, 1:])
     return np.minimum(lower[:-1], lower[1:])
-
-
-def free_blocks(field: ClearanceField, need: float) -> tuple[int, np.ndarray]:
-    """The side of the squares in cells of the raster, and which may hold a point with the clearance `need` [m].
-
-    Kept for the last `need`, since the requests of one vehicle ask for the same.
-    """
-    kept = _squares.get(field)
-    if kept is None or kept[0] != need:
-        block = _block(field.kernel.field.shape, SIDE * need / field.kernel.resolution)
-        _squares[field] = kept = need, block, free_squares(field.kernel, block, need)
-    return kept[1:]
-
-
-def _block(shape: tuple[int, int], wish: float) -> int:
-    """How many cells of the raster make a side of a square."""
-    return max(1, math.floor(wish), math.ceil(math.sqrt(shape[0] * shape[1] / MOST_SQUARES)))

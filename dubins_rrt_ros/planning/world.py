@@ -1,0 +1,84 @@
+"""A world: what depends on map, vehicle and the use of unknown space alone, computed once for many requests."""
+
+from functools import cached_property
+from typing import Any
+
+from .audit.obstacles import Obstacles, obstacles_of
+from .collision.clearance import ClearanceField
+from .collision.footprint import cover
+from .maps.model import Map
+from .vehicle import Vehicle
+
+
+class World:
+    """A map, prepared for a vehicle; `prepare` makes one, and `Problem` takes it in place of the two.
+
+    It is a value: it never changes, and several threads may use it. What was computed is dropped when it is pickled, and made
+    again when it is asked for.
+
+    Attributes:
+        map: free and occupied space.
+        vehicle: the vehicle that it is prepared for.
+        allow_unknown: True if the vehicle may drive through unknown space.
+    """
+
+    def __init__(self, map: Map, vehicle: Vehicle, allow_unknown: bool = False):
+        self.map, self.vehicle, self.allow_unknown = map, vehicle, allow_unknown
+
+    @cached_property
+    def field(self) -> ClearanceField:
+        """The distances to the nearest obstacle, with the components and the squares that are free for the vehicle."""
+        return ClearanceField(self.map, self.allow_unknown)
+
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """The true shapes of the obstacles, for the audit."""
+        return obstacles_of(self.map, self.allow_unknown)
+
+    def for_vehicle(self, vehicle: Vehicle) -> "World":
+        """Prepare the same map for another vehicle: the clearance is shared, and this world stays as it is."""
+        return prepare(self.map, vehicle, self.allow_unknown, self)
+
+    def updated(self, map: Map) -> "World":
+        """Prepare another map, which differs in places: what is the same as here is reused, and this world stays as it is.
+
+        Returns:
+            Bit for bit the world that `prepare` makes of the other map.
+        """
+        return prepare(map, self.vehicle, self.allow_unknown, self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return World, (self.map, self.vehicle, self.allow_unknown)
+
+    def __repr__(self) -> str:
+        return f"World(map={self.map.name!r}, vehicle={self.vehicle}, allow_unknown={self.allow_unknown})"
+
+
+def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: World | None = None) -> World:
+    """Compute what depends on map and vehicle alone, so that requests need not wait for it.
+
+    Args:
+        map: free and occupied space.
+        vehicle: what drives there.
+        allow_unknown: True if it may drive through unknown space.
+        previous: a world whose parts are reused where they are the same, of this map or of one that differs in places. It
+            makes no difference to the result, and is not kept.
+    """
+    world = World(map, vehicle, allow_unknown)
+    if previous is not None and previous.allow_unknown == allow_unknown:
+        _reuse(world, previous)
+    world.field.components(vehicle.inner_radius)
+    world.field.free_squares(vehicle.inner_radius)
+    if vehicle.outline:
+        cover(vehicle.outline)
+    return world
+
+
+def _reuse(world: World, previous: World) -> None:
+    """Take over from `previous` what `world` has in common with it."""
+    if world.map is previous.map:
+        takes_as_much_room = world.vehicle.inner_radius == previous.vehicle.inner_radius
+        world.field = previous.field if takes_as_much_room else previous.field.shared()
+        world.obstacles = previous.obstacles
+    else:
+        world.field = ClearanceField(world.map, world.allow_unknown, previous.field)

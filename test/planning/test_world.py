@@ -1,0 +1,178 @@
+"""A prepared world: what it shares, what it is the same as, and that problems take it."""
+
+import gc
+import pickle
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.cases import boxes_grid, holed_polygons, scaled
+
+from dubins_rrt_ros.planning import GridMap, OptionError, Problem, Settings, Vehicle, World, audit_path, plan, prepare
+from dubins_rrt_ros.planning.collision import clearance as clearance_module
+
+SMALL, LARGE = Vehicle(0.5, 0.1), Vehicle(0.7, 0.4)
+QUICK = Settings(samples=100, planning_time=600.0, seed=1)
+
+
+def world_of(make=boxes_grid, vehicle=SMALL, **options):
+    return prepare(make(np.random.default_rng(5)), vehicle, **options)
+
+
+def problem_in(world):
+    """From the first free corner to the last."""
+    corners = world.map.corners()
+    start, goal = (corners[0] + share * (corners[2] - corners[0]) for share in (0.06, 0.94))
+    return Problem(world, start=(*start, 0.8), goal=(*goal, 0.8))
+
+
+def parts_of(world):
+    """All that was computed, as arrays."""
+    kernel = world.field.kernel
+    names = ("field", "aside") if isinstance(world.map, GridMap) else ("field",)
+    need = world.vehicle.inner_radius
+    squares = world.field.free_squares(need)
+    return [*(np.array(getattr(kernel, name)) for name in names), world.field.components(need), squares.is_free,
+            np.array(squares.cells), np.array(kernel.resolution)]
+
+
+def assert_same(found, expected):
+    assert (found.map, found.vehicle, found.allow_unknown) == (expected.map, expected.vehicle, expected.allow_unknown)
+    for part, other in zip(parts_of(found), parts_of(expected), strict=True):
+        np.testing.assert_array_equal(part, other)
+
+
+def changed_map(rng, grid):
+    """The grid with some boxes of cells changed, on another place or with another shape now and then."""
+    data = grid.data.copy()
+    for _ in range(rng.integers(4)):
+        row, column = rng.integers(0, data.shape)
+        height, width = rng.integers(1, 15, 2)
+        data[row:row + height, column:column + width] = rng.choice([0, 100, -1])
+    if rng.random() < 0.1:
+        data = data[:-1]
+    return GridMap(data, grid.resolution, rng.uniform(-3, 3, 3) if rng.random() < 0.2 else grid.origin)
+
+
+@pytest.mark.parametrize("allow_unknown", [False, True])
+def test_an_updated_world_is_the_world_of_the_new_map(allow_unknown):
+    rng = np.random.default_rng(6)
+    world = world_of(allow_unknown=allow_unknown)
+    for _ in range(scaled(100, least=10)):
+        before = world, parts_of(world)
+        world = world.updated(changed_map(rng, world.map))
+        assert_same(world, prepare(world.map, SMALL, allow_unknown))
+        for part, kept in zip(parts_of(before[0]), before[1], strict=True):
+            np.testing.assert_array_equal(part, kept)
+
+
+def test_a_world_of_polygons_is_updated_as_a_whole():
+    world = world_of(holed_polygons)
+    other = holed_polygons(np.random.default_rng(8))
+    assert_same(world.updated(other), prepare(other, SMALL))
+    assert_same(world_of().updated(other), prepare(other, SMALL))
+    grid = world_of()
+    assert_same(world.updated(grid.map), grid)
+
+
+def counted(monkeypatch, *names):
+    """How often functions of the clearance field are called, by name."""
+    calls = dict.fromkeys(names, 0)
+
+    def count(name, function):
+        def counting(*args):
+            calls[name] += 1
+            return function(*args)
+        return counting
+
+    for name in names:
+        monkeypatch.setattr(clearance_module, name, count(name, getattr(clearance_module, name)))
+    return calls
+
+
+def test_two_vehicles_on_one_map_prepare_once_each(monkeypatch):
+    calls = counted(monkeypatch, "_grid_parts", "free_squares")
+    small = world_of()
+    large = small.for_vehicle(LARGE)
+    for _ in range(3):
+        for world in (small, large):
+            assert plan(problem_in(world), QUICK).problem.vehicle == world.vehicle
+    assert calls == {"_grid_parts": 1, "free_squares": 2}
+    assert_same(large, prepare(small.map, LARGE))
+    assert_same(small, prepare(small.map, SMALL))
+
+
+def test_a_vehicle_that_takes_as_much_room_shares_all(monkeypatch):
+    small = world_of()
+    calls = counted(monkeypatch, "_grid_parts", "free_squares")
+    turning = small.for_vehicle(replace(SMALL, turning_radius=2.0))
+    assert turning.vehicle.turning_radius == 2.0
+    assert turning.field.kernel is small.field.kernel
+    assert calls == {"_grid_parts": 0, "free_squares": 0}
+
+
+@pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
+def test_in_its_world_a_problem_is_planned_as_on_its_map(make):
+    problem = problem_in(world_of(make))
+    bare = Problem(problem.map, problem.vehicle, problem.start, problem.goal)
+    assert bare.world is None
+    found, expected = plan(problem, QUICK), plan(bare, QUICK)
+    assert found.path == expected.path
+    assert found.tree.poses.tobytes() == expected.tree.poses.tobytes()
+    if found.path:
+        assert audit_path(found.path, bare) == audit_path(found.path, problem, problem.world.obstacles)
+
+
+@pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
+def test_a_world_goes_without_what_was_computed_when_it_is_pickled(make):
+    world = world_of(make)
+    pickled = pickle.dumps(problem_in(world))
+    assert len(pickled) < len(pickle.dumps(world.map)) + 2000
+    again = pickle.loads(pickled)
+    assert isinstance(again.world, World)
+    assert again.world.map is again.map
+    for part, other in zip(parts_of(again.world), parts_of(world), strict=True):
+        np.testing.assert_array_equal(part, other)
+    assert plan(again, QUICK).path == plan(problem_in(world), QUICK).path
+
+
+@pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
+def test_a_world_is_let_go(make):
+    world = world_of(make)
+    updated = world.updated(boxes_grid(np.random.default_rng(7)))
+    plan(problem_in(world), QUICK)
+    seen = weakref.ref(world), weakref.ref(world.map)
+    del world
+    gc.collect()
+    assert [reference() for reference in seen] == [None, None]
+    assert updated.map is not None
+
+
+def test_a_problem_takes_map_vehicle_and_unknown_space_from_its_world():
+    world = world_of(allow_unknown=True)
+    problem = problem_in(world)
+    assert (problem.map, problem.vehicle, problem.allow_unknown, problem.world) == (world.map, SMALL, True, world)
+    moved = replace(problem, start=(0.0, 0.0, 0.0))
+    assert moved.world is world
+
+
+@pytest.mark.parametrize("changes", [
+    {"map": boxes_grid(np.random.default_rng(9))}, {"vehicle": LARGE}, {"allow_unknown": True},
+])
+def test_a_problem_of_something_else_has_no_world(changes):
+    assert replace(problem_in(world_of()), **changes).world is None
+
+
+def test_a_world_for_another_vehicle_or_use_of_unknown_space_is_refused():
+    ends = {"start": (0.0, 0.0, 0.0), "goal": (1.0, 1.0, 0.0)}
+    with pytest.raises(OptionError, match=r"world.for_vehicle"):
+        Problem(world_of(), LARGE, **ends)
+    with pytest.raises(OptionError, match="allow_unknown=True"):
+        Problem(world_of(), allow_unknown=True, **ends)
+    assert Problem(world_of(), SMALL, **ends).vehicle == SMALL
+
+
+def test_a_map_without_a_vehicle_is_refused():
+    with pytest.raises(TypeError, match="give a Vehicle, or a World"):
+        Problem(world_of().map, start=(0.0, 0.0, 0.0), goal=(1.0, 1.0, 0.0))
