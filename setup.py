@@ -30,7 +30,7 @@ def installed(folder, *patterns):
 
 
 ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
-TEST = ["pytest>=7.4", "hypothesis>=6.98", "import-linter>=2.0", "ruff>=0.6"]
+TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "ruff>=0.6"]
 
 setup(
     name=PACKAGE,

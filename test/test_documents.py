@@ -111,6 +111,7 @@ def folder_of(tmp_path_factory):
     return copied
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("block", RUN, ids=[f"{block.page}:{block.line}" for block in RUN])
 def test_a_block_runs_as_printed(block, environment, folder_of, tmp_path):

@@ -75,6 +75,7 @@ def test_a_line_tells_what_plan_does(capsys):
     assert f" ms, {min(line['final_cost'] for line in lines[:2]):.2f} m\n" in said
 
 
+@pytest.mark.slow
 def test_any_number_of_processes_plans_the_same():
     file = problems(entry(), entry(name="back", start=[*GOAL[:2], 1.57], goal=[*START[:2], -1.57]))
     alone = bench(file, "--seeds", "2", *BUDGET)
@@ -173,6 +174,7 @@ def test_problems_must_be_given_to_measure(capsys):
     assert "PROBLEMS.json must be given" in refusal("--out", "r", capsys=capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_keeps_the_lines_that_are_written(jobs):
     """The second problem's goal lies behind a gap that the vehicle fits through only by a hair."""

@@ -47,6 +47,7 @@ def run(*argv, capsys):
     return status, *capsys.readouterr()
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_the_planner_is_right(tmp_path, capsys):
     file = tmp_path / "lines.jsonl"
@@ -59,6 +60,7 @@ def test_the_planner_is_right(tmp_path, capsys):
     assert len({line["kind"] for line in lines}) > 5 and {"NONE", "NO_VALID_PATH"} < {line["status"] for line in lines}
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_any_number_of_processes_judges_the_same(tmp_path, capsys):
     def lines(jobs):
@@ -143,6 +145,7 @@ def test_a_broken_invariant_is_found(monkeypatch):
     assert "PlanError: -1 samples were drawn of 60" in findings_of(walled_trial(), monkeypatch)
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_late_is_found(monkeypatch):
     def late(problem, settings):
         end = time.process_time() + 1.5
@@ -168,6 +171,7 @@ def test_an_answer_that_changes_is_found(monkeypatch):
     assert "planned again it came to NONE, and to another tree or path" in findings_of(walled_trial(), monkeypatch)
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_or_hangs_is_told_and_replaced():
     dies, hangs = "__import__('os')._exit(3)", "__import__('time').sleep(3600)"
     found = list(results(eval, ["1", dies, "2", hangs, "3", "4"], 2, 8.0, lambda task, what: (task, what)))

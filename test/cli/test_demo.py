@@ -25,6 +25,7 @@ def run_demo(folder):
                           timeout=120)
 
 
+@pytest.mark.slow
 def test_the_demo_plans_over_real_topics_and_draws(tmp_path):
     pytest.importorskip("rclpy")
     ended = run_demo(tmp_path)

@@ -33,6 +33,7 @@ def test_no_figure_is_drawn_in_vain():
     assert {file.stem for _, file in SHOWN} == set(figures.all_figures())
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_the_command_draws_all_figures_in_all_formats(tmp_path, capsys):
     folder, report = tmp_path / "new" / "figures", tmp_path / "report.json"
@@ -47,12 +48,14 @@ def test_the_command_draws_all_figures_in_all_formats(tmp_path, capsys):
         assert (folder / f"{name}.svg").stat().st_size < 200_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", figures_geometry.FIGURES)
 def test_a_figure_has_the_same_bytes_each_time(name, tmp_path):
     first, again = (figures.save(figures_geometry.FIGURES[name](), tmp_path / f"{name}{i}") for i in range(2))
     assert [Path(file).read_bytes() for file in first] == [Path(file).read_bytes() for file in again]
 
 
+@pytest.mark.slow
 def test_the_walk_that_is_drawn_finds_the_curves_free_that_the_planner_finds_free():
     rng, found = np.random.default_rng(1), []
     for _ in range(20):

@@ -81,6 +81,7 @@ def test_the_cost_to_go_is_drawn_where_the_vehicle_fits_in_the_colours_of_its_ba
     assert (image.get_array() >= 0.95 * straight - 0.3).all() and image.get_array().max() > 1.2 * straight.max()
 
 
+@pytest.mark.slow
 def test_more_samples_never_make_a_path_longer(monkeypatch):
     monkeypatch.setattr(figures_search, "SEEDS", range(2))
     axes, = figures_search.convergence().axes

@@ -73,6 +73,7 @@ def test_every_command_has_examples_that_are_understood_and_tells_the_exit_statu
     assert mine and re.search(r"^exit status:\n  0 .*2 wrong usage", help_of(command), re.MULTILINE)
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("command, some, files", [
     ("plan", slice(None), ["maze.png", "plan.json"]), ("audit", slice(None), ["plan.json", "theirs.json"]),

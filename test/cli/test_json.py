@@ -96,6 +96,7 @@ def test_render_writes_the_files_and_the_measures(capsys):
     assert "grids/hall.yaml and its image" in error
 
 
+@pytest.mark.slow
 def test_demo_writes_what_it_received(monkeypatch, capsys):
     """By a file, and with the words on standard output; test_demo.py runs the node."""
     pytest.importorskip("rclpy")

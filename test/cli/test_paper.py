@@ -47,6 +47,7 @@ def report_rows(folder, first):
     return [cells for cells in rows if cells[0] == first]
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_rrt_star_is_never_longer_with_more_samples_of_the_same_seed(lengths):
     by_seed = defaultdict(dict)
@@ -59,6 +60,7 @@ def test_rrt_star_is_never_longer_with_more_samples_of_the_same_seed(lengths):
         assert falling == sorted(falling, reverse=True) and falling[-1] < falling[MARKS.index(500)] < math.inf
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_rrt_star_is_at_least_8_percent_shorter_than_rrt(folder, lengths):
     rrt, star = (min(lengths[Run("maze", planner, 3000, "uniform", 0.0, seed)] for seed in (0, 1))
@@ -70,6 +72,7 @@ def test_rrt_star_is_at_least_8_percent_shorter_than_rrt(folder, lengths):
     assert all(len(report_rows(folder, str(samples))) == 1 for samples in TABLE)
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_the_runs_are_those_of_the_papers_algorithms(lengths):
     file = maps_directory() / "forest.geojson"
@@ -94,6 +97,7 @@ def test_the_report_is_whole_and_shows_every_figure(folder):
     assert all(len(line) <= 130 for line in text.splitlines() if line[:1] not in ("|", "["))
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_rrt_with_headings_towards_the_goal_never_passes_the_second_wall(folder, lengths):
     """As the report explains."""
@@ -133,6 +137,7 @@ def test_the_picture_shows_the_median_of_the_paths_that_were_found(samples, seed
     assert measured.median_run("maze", "rrt", samples) == (Run("maze", "rrt", samples, "uniform", 0.0, seed), found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_it_and_keeps_the_lines_that_are_written(jobs, tmp_path):
     command = [sys.executable, "-m", "dubins_rrt_ros", "paper", "--out", str(tmp_path), "--jobs", jobs]

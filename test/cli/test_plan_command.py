@@ -215,6 +215,7 @@ def test_ctrl_c_gives_the_best_path_so_far(hall):
     assert "Traceback" not in shown and "tree nodes" in out
 
 
+@pytest.mark.slow
 def test_ctrl_c_before_a_path_is_cancelled(hall):
     """The goal lies behind a gap that the vehicle fits through only by a hair."""
     Path("gap.wkt").write_text(shapely.box(-6, -5, 6, 5).difference(

@@ -20,6 +20,7 @@ def start(*words, **keywords):
     return subprocess.Popen([sys.executable, "-m", "dubins_rrt_ros", *words], text=True, env=environment, **streams)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [[*PLAN, "--json", "-", "--path-spacing", "0.001"], PLAN, ["--help"], ["completion", "bash"]])
 def test_a_reader_that_goes_away_is_no_error(words):
     """As `dubins_rrt ... | true`: much output fails while it is written, a little at the end."""
@@ -29,6 +30,7 @@ def test_a_reader_that_goes_away_is_no_error(words):
     assert process.returncode == 141 and "Error" not in error and "Traceback" not in error
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
 @pytest.mark.parametrize("words", [[*PLAN, "--json", "-", "--path-spacing", "0.001"], PLAN])
 def test_a_full_disk_is_told_in_one_line(words):
@@ -64,6 +66,7 @@ def test_ctrl_c_while_it_starts_prints_no_trace():
     assert done.returncode == 130 and done.stderr == "dubins_rrt campaign: interrupted\n" and done.stdout == ""
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_a_campaign_with_what_was_done(jobs, tmp_path):

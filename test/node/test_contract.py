@@ -209,6 +209,7 @@ sys.exit(main.main())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["topic", "service"])
 def test_200_a_defect_is_logged_with_its_trace_and_the_node_lives_on(planners, map_file, by):
     process = planners.start(command=[sys.executable, "-c", FAULTY], map_file=map_file, **QUICK)
@@ -284,6 +285,7 @@ def test_a_start_that_comes_while_planning_takes_effect_for_the_next_request(wit
 
 # Diagnostics
 
+@pytest.mark.slow
 def test_diagnostics_repeat_the_last_status_about_once_a_second(with_file):
     _, client = with_file
     client.set_parameters(**QUICK)

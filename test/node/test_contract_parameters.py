@@ -148,6 +148,7 @@ def test_the_same_seed_and_sample_budget_give_the_same_path(on_the_yard):
     assert first == second
 
 
+@pytest.mark.slow
 def test_use_sim_time_stamps_by_the_clock(planners, map_file):
     planners.start(map_file=map_file, use_sim_time=True, **QUICK)
     client = planners.client()

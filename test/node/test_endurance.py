@@ -35,6 +35,7 @@ def report(record_property):
     return tell
 
 
+@pytest.mark.slow
 def test_a_thousand_goals_leave_nothing_behind(planners, map_yaml, record_property):
     process = planners.start(map_file=str(map_yaml), planner="rrt", planning_time=15.0, path_spacing=0.5)
     talk = Conversation(process, planners.client(listens_to_tree=True))
@@ -55,6 +56,7 @@ def test_a_thousand_goals_leave_nothing_behind(planners, map_yaml, record_proper
     assert "Traceback" not in process.output
 
 
+@pytest.mark.slow
 def test_it_answers_while_it_plans(planners, map_yaml, tmp_path, report):
     script, file = Path(ticking_planner.__file__), tmp_path / "ticks.json"
     process = planners.start(command=[sys.executable, str(script), str(file)], map_file=str(map_yaml),

@@ -93,6 +93,7 @@ def test_nobody_on_the_network_can_change_the_directory(limited, folder):
     assert load(client, str(folder / "small.yaml")).result == LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
 
 
+@pytest.mark.slow
 def test_with_a_directory_that_is_not_there_no_map_is_loaded(limited, module_planners, folder):
     module_planners.start(map_directory=str(folder / "nowhere"))
     client = module_planners.client()

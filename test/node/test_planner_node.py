@@ -181,6 +181,7 @@ def occupancy(width=100):
     return message
 
 
+@pytest.mark.slow
 def test_without_a_map_it_waits_for_one_and_plans_once_it_is_there(planners):
     talk = Conversation(planners.start(**QUICK), planners.client())
     client = talk.client
@@ -199,6 +200,7 @@ def test_without_a_map_it_waits_for_one_and_plans_once_it_is_there(planners):
     assert talk.goal(GOAL, error_name="NONE")["map_id"]
 
 
+@pytest.mark.slow
 def test_a_map_that_came_before_the_node_is_taken(planners):
     first = planners.start(**QUICK)
     client = planners.client()
@@ -210,6 +212,7 @@ def test_a_map_that_came_before_the_node_is_taken(planners):
     client.wait_for(lambda: "Took a map" in second.output, "the latched map to be taken")
 
 
+@pytest.mark.slow
 def test_a_volatile_map_is_taken_where_the_parameter_says_so(planners):
     process = planners.start(map_transient_local=False)
     client = planners.client()

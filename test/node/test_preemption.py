@@ -104,6 +104,7 @@ def test_improvements_have_one_plan_id_and_rising_revisions_and_the_last_is_told
     assert is_of(talk.client.statuses[-1], talk.client.paths[-1])
 
 
+@pytest.mark.slow
 def test_goals_do_not_disturb_get_plan(talk):
     talk = talk(**LONG)
     client = talk.client
@@ -131,6 +132,7 @@ def test_get_plan_does_not_disturb_a_goal(talk):
     assert set(goals_of_trees(client)) == {GOAL[:2]}
 
 
+@pytest.mark.slow
 def test_a_burst_of_goals_ends_with_the_last_one_and_leaves_nothing_behind(talk, record_property):
     talk = talk(planner="rrt", planning_time=15.0)
     client, process = talk.client, talk.process

@@ -38,6 +38,7 @@ def test_the_help_lists_every_parameter(planners):
         assert f"{item.name} (default {item.default!r}): {item.describe()}" in process.output
 
 
+@pytest.mark.slow
 def test_the_defaults_are_printed_as_a_parameter_file_that_the_node_takes(planners, tmp_path):
     process = planners.start("--", "--print-parameters")
     assert process.wait() == 0
@@ -50,6 +51,7 @@ def test_the_defaults_are_printed_as_a_parameter_file_that_the_node_takes(planne
     assert "arameter" not in process.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["--fast"], ["maze.yaml"], ["--help-me"], ["-p", "samples:=3"]])
 def test_an_unknown_argument_ends_it_with_the_usage(planners, arguments):
     process = planners.start("--", *arguments)
@@ -60,6 +62,7 @@ def test_an_unknown_argument_ends_it_with_the_usage(planners, arguments):
 
 # The configuration
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parameters", "words"), [
     ({"turning_radius": -1.0}, ["turning_radius is -1.0", "from 0.001"]),
     ({"turning_radius": "wide"}, ["turning_radius is 'wide'", "a number"]),
@@ -96,6 +99,7 @@ def test_a_broken_map_file_ends_it_with_one_line(planners, map_yaml):
     assert_ends_with_one_line(planners.start(map_file=str(broken)), ["broken.yaml", "resolution", "-0.1", "above 0"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "words"), [
     (["-r", "__node:=no-name"], ["no-name"]), (["-r", "__node:=2fast"], ["2fast"]), (["-r", "__ns:=/2fast"], ["2fast"]),
     (["-r", "plan:=no//name"], ["no//name"]), (["-r", "plan:="], ["plan:="]), (["-p", "samples"], ["samples"]),
@@ -115,6 +119,7 @@ def assert_names(process, words):
     assert [word for word in words if word not in line] == [], line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["a: [", "\x00\x01", "planner:\n  samples: 3\n",
                                      "planner:\n  ros__parameters:\n    samples: [1, a]\n"])
 def test_a_broken_parameter_file_is_named(planners, tmp_path, content):
@@ -123,6 +128,7 @@ def test_a_broken_parameter_file_is_named(planners, tmp_path, content):
     assert_names(planners.start("--params-file", str(file)), ["broken.yaml"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["just text", "another:\n  ros__parameters:\n    samples: 3\n"])
 def test_a_parameter_file_that_has_nothing_for_the_node_gets_a_warning(planners, tmp_path, content):
     file = tmp_path / "useless.yaml"
@@ -229,6 +235,7 @@ STATES = [waits_for_a_map, waits_for_a_start, is_idle, plans_to_a_goal, serves_r
           prepares_a_large_map, prepares_a_large_map_of_the_topic]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("state", STATES)
 def test_a_signal_ends_it_whatever_it_does(planners, map_yaml, noise_yaml, state, by):
@@ -236,6 +243,7 @@ def test_a_signal_ends_it_whatever_it_does(planners, map_yaml, noise_yaml, state
     assert_ended(process, *process.end(by))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("state", [is_idle, plans_to_a_goal, prepares_a_large_map])
 def test_a_second_signal_does_not_break_off_the_end(planners, map_yaml, noise_yaml, state, by):
@@ -251,6 +259,7 @@ def assert_ended(process, status, took):
 
 # The end of others
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["get_plan", "goals"])
 def test_a_client_that_is_killed_leaves_the_node_to_the_next(planners, map_yaml, what):
     process = planners.start(map_file=str(map_yaml), **QUICK)
@@ -274,6 +283,7 @@ def test_a_client_that_is_killed_leaves_the_node_to_the_next(planners, map_yaml,
     assert "Traceback" not in process.output
 
 
+@pytest.mark.slow
 def test_a_node_that_is_killed_leaves_its_client_to_the_next(planners, map_yaml):
     first = planners.start(map_file=str(map_yaml), **LONG)
     client = planners.client()
@@ -296,6 +306,7 @@ def test_a_node_that_is_killed_leaves_its_client_to_the_next(planners, map_yaml)
     assert "Traceback" not in second.output
 
 
+@pytest.mark.slow
 def test_two_planners_in_two_namespaces_do_not_hear_each_other(planners, map_yaml):
     talks = [Conversation(planners.start(map_file=str(map_yaml), **QUICK), planners.client()) for _ in range(2)]
     for talk, goal in zip(talks, [GOAL, (8.5, 2.0, 0.0)], strict=True):

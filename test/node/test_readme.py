@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from dubins_rrt_ros.planning import Status
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text("utf-8")
@@ -46,6 +48,7 @@ def test_the_table_of_error_codes_is_that_of_the_statuses():
     assert told == {int(status): status.name for status in Status}
 
 
+@pytest.mark.slow
 def test_the_table_of_topics_and_services_is_what_a_running_node_has(planners):
     told = {(direction, name.strip("`"), kind) for direction, name, kind, *_ in table("direction", "name", "type")}
     has = set()

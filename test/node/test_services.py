@@ -266,6 +266,7 @@ def test_cancel_while_a_goal_waits_for_a_start(module_planners, running, folder)
     assert told.message in said
 
 
+@pytest.mark.slow
 def test_a_signal_ends_the_node_that_owes_answers(planners, folder):
     process = planners.start(map_file=str(folder / "yard.yaml"), **ENDLESS)
     client = planners.client()

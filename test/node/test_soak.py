@@ -32,6 +32,7 @@ GROWTH = 10.0
 LOG = 5000
 
 
+@pytest.mark.slow
 def test_soak(planners, request, record_property):
     seconds, seed = request.config.getoption("--soak"), request.config.getoption("--soak-seed")
     seed = int(np.random.SeedSequence().entropy % 2**31) if seed is None else seed

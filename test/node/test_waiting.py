@@ -54,6 +54,7 @@ def waiting(module_planners, tmp_path_factory):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MISFITS)
 def test_a_publisher_that_does_not_fit_is_named_with_the_remedy_in_log_and_status(waiting, name):
     process, client = waiting[name]
@@ -68,6 +69,7 @@ def test_a_publisher_that_does_not_fit_is_named_with_the_remedy_in_log_and_statu
     client.wait_for_word(status.message)
 
 
+@pytest.mark.slow
 def test_without_a_map_log_and_status_say_what_would_bring_one(waiting):
     process, client = waiting["no map"]
     told = client.status_of(0, error_name="NO_MAP")
@@ -77,12 +79,14 @@ def test_without_a_map_log_and_status_say_what_would_bring_one(waiting):
     client.wait_for_word(told["message"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [("no map", "There is no map yet"), ("no start", "Waiting for a start")])
 def test_what_is_waited_for_is_logged_again_and_again(waiting, name, words):
     process, client = waiting[name]
     client.wait_for(lambda: process.output.count(words) >= 2, f"{words!r} twice in the log")
 
 
+@pytest.mark.slow
 def test_a_map_that_is_refused_is_told_with_what_is_waited_for(waiting):
     _, client = waiting["no map"]
     broken = occupancy(FREE)
@@ -93,6 +97,7 @@ def test_a_map_that_is_refused_is_told_with_what_is_waited_for(waiting):
     client.wait_for_word(told.message)
 
 
+@pytest.mark.slow
 def test_the_topics_of_a_start_are_named_in_the_log(waiting):
     process, _ = waiting["no start"]
     namespace = process.name.removesuffix("/planner")
@@ -100,12 +105,14 @@ def test_the_topics_of_a_start_are_named_in_the_log(waiting):
     assert "no map" not in process.output
 
 
+@pytest.mark.slow
 def test_a_publisher_of_starts_that_does_not_fit_is_named_with_the_remedy(waiting):
     process, client = waiting["unheard start"]
     client.wait_for_word(f"{client.node.get_fully_qualified_name()} offers it with best-effort reliability")
     assert "publish it reliably" in process.output
 
 
+@pytest.mark.slow
 def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the_wait(waiting):
     _, client = waiting["no start"]
     client.send("start_pose", (math.nan, 5.0, 0.0))
@@ -130,6 +137,7 @@ def nothing_known(planners):
     return planners.client()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_start", [False, True], ids=["without a start", "with a start"])
 def test_once_a_map_came_the_status_is_no_longer_that_there_is_none(nothing_known, has_start):
     client = nothing_known

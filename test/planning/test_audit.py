@@ -137,6 +137,7 @@ def straight_past(map, gap, radius):
     return Problem(map, Vehicle(1.0, radius), start, goal), Path(start, goal, (shortest(start, goal, 1.0),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 @pytest.mark.parametrize("gap, free", [(0.301, True), (0.299, False), (0.3, True), (0.0, False), (-0.1, False)])
 def test_contact_along_a_straight_line(kind, gap, free):
@@ -195,6 +196,7 @@ def test_a_path_that_stays_where_it_is(kind):
     assert not audit_function(Path(START, START, ()), replace(problem, vehicle=Vehicle(1.0, 2.1))).ok
 
 
+@pytest.mark.slow
 def test_least_clearance_is_that_of_the_naive_twin():
     rng = np.random.default_rng(5)
     found = 0

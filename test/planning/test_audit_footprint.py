@@ -92,6 +92,7 @@ def maps(draw):
 POSES = st.tuples(st.floats(1.5, 6.5), st.floats(1.5, 6.5), st.floats(-3, 3))
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(maps(), outlines(), st.lists(POSES, min_size=2, max_size=3), st.floats(0.3, 2.0))
 def test_the_verdict_is_that_of_the_polygon_at_many_poses(map, outline, poses, radius):

@@ -33,6 +33,7 @@ def bend(radius=1.0, spacing=0.05):
     return DubinsCurve((5.0, 5.0, 0.0), radius, "LSL", (0.0, 3.0, math.pi * radius)).poses(spacing)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.lists(POSES, min_size=2, max_size=4), st.sampled_from([0.01, 0.05, 0.3]), st.sampled_from([LONG, DISC]))
 def test_the_poses_of_curves_are_judged_as_the_curves_are(ends, spacing, vehicle):

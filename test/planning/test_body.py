@@ -70,6 +70,7 @@ def random_curves(rng, map, clearance, radius, count):
             yield shortest((*start.tolist(), theta), (*(start + away).tolist(), theta + rng.normal(0, 1)), radius)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outline", OUTLINES)
 @pytest.mark.parametrize("kind", MAPS)
 def test_curves_and_poses_as_brute_force_sees_them(kind, outline):

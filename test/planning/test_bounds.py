@@ -82,6 +82,7 @@ def slopes(field, squares):
     return np.sqrt(steeper) / field.kernel.side
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MAPS)
 def test_no_way_is_shorter_and_the_shortest_is_little_longer(kind):
     """Than the distances, against ways on a fine lattice in 32 directions."""
@@ -100,6 +101,7 @@ def test_no_way_is_shorter_and_the_shortest_is_little_longer(kind):
             assert np.median(found[far] / lengths[far]) > (0.88 if kind in ("boxes", "maze") else 0.92)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(30, least=5)))
 def test_no_gradient_is_above_one_and_the_source_costs_nothing(seed):
     """On every triangle of the squares that may be free: that is the proof of the bound."""
@@ -116,6 +118,7 @@ def test_no_gradient_is_above_one_and_the_source_costs_nothing(seed):
     assert (DistanceField.to_goal(problem, field).make_bound().at(places[free]) == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(30, least=3)))
 def test_every_place_that_is_free_lies_in_a_free_square(seed):
     """In turned grids and polygons; where it has a way to the source, the field knows a distance."""
@@ -130,6 +133,7 @@ def test_every_place_that_is_free_lies_in_a_free_square(seed):
         assert (found.at(near) <= np.hypot(*(near - source).T)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(20, least=2)))
 def test_the_way_there_is_as_long_as_the_way_back(seed):
     rng = np.random.default_rng(seed)
@@ -146,6 +150,7 @@ def test_the_way_there_is_as_long_as_the_way_back(seed):
         assert there == pytest.approx(back, rel=0.05, abs=2 * to_goal.kernel.side)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(30, least=2)))
 def test_no_path_is_shorter_than_the_bound(seed):
     rng = np.random.default_rng(100 + seed)

@@ -26,6 +26,7 @@ def assert_joined(chain, radius):
         assert abs(math.remainder(end[2] - chain.poses[i, 2], math.tau)) <= 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("longest", [0.01, 0.3, 1.0, 2.5, 1e6])
 def test_pieces_are_no_longer_than_asked(longest):
     rng = np.random.default_rng(1)

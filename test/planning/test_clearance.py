@@ -38,6 +38,7 @@ def random_points(rng, map, count, share_outside=0.2):
     return corners[0] + share @ (corners[[1, 3]] - corners[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("allow_unknown", [False, True])
 @pytest.mark.parametrize("kind", MAPS)
 def test_distances_are_those_of_brute_force(kind, allow_unknown):
@@ -75,6 +76,7 @@ def test_not_a_number_is_outside(map):
     assert ClearanceField(map).at([(math.nan, 0.5), (0.5, math.inf), (1e300, -1e300)]).tolist() == [0, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MAPS)
 def test_a_curve_is_free_exactly_where_its_least_clearance_suffices(kind):
     """Never with less than what is needed, always with a millimetre more."""
@@ -103,6 +105,7 @@ def check_curve(field, clearance, curve):
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("allow_unknown", [False, True])
 def test_cells_that_may_be_free_hold_every_free_point(allow_unknown):
     rng = np.random.default_rng(3)
@@ -176,6 +179,7 @@ def test_no_way_between_squares_that_touch_at_a_corner():
     assert not keeps(field, DubinsCurve((0.5, 3.4, -math.pi / 4), 1.0, "LSL", (0.0, 3 * math.sqrt(2), 0.0)), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("need", [0.0, 1e-6, 0.1])
 @pytest.mark.parametrize("thickness", [1, 1e-2, 1e-4, 1e-7])
 def test_no_obstacle_is_too_thin(thickness, need):

@@ -87,6 +87,7 @@ def test_length_jumps_where_the_car_cannot_swerve_in_time(x, length):
     assert shortest((0, 0, 0), (x, 0.3, 0), 1).length == pytest.approx(length, abs=0.005)
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_a_million_pairs():
     rng = np.random.default_rng(1)
@@ -312,6 +313,7 @@ def test_what_is_left_of_a_curve_is_no_longer_than_that(far):
         assert left.length <= (1 - share) * whole.length + 1e-6
 
 
+@pytest.mark.slow
 def test_a_limit_lets_just_the_shorter_curves_pass():
     """Short ones and any, with limits a little above and a little below the length of the shortest."""
     rng, kernel = np.random.default_rng(2), interpreted("dubins")

@@ -48,6 +48,7 @@ def test_a_footprint_is_covered(kind):
     check_cover(Vehicle(footprint=OUTLINES[kind]).outline)
 
 
+@pytest.mark.slow
 @settings(max_examples=scaled(100, least=10))
 @given(st.lists(st.tuples(st.floats(0, math.tau), st.floats(0.05, 3)), min_size=3, max_size=9, unique_by=lambda polar: polar[0]))
 def test_any_footprint_is_covered(corners):

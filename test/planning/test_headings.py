@@ -137,6 +137,7 @@ def test_every_kind_solves_the_maze(kind):
             assert again.path.poses(0.1).tobytes() == result.path.poses(0.1).tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["field", "mixed"])
 def test_headings_on_random_problems(kind):
     """On every kind of map, with every kind of vehicle and tolerance."""

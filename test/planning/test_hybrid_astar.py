@@ -73,6 +73,7 @@ def check(chain, problem):
     assert audit_path(path, problem).ok
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_paths_on_random_problems_are_free_and_lead_to_the_goal():
     """Of every kind of map, vehicle and tolerance; those that are found at all."""

@@ -47,6 +47,7 @@ def test_shortest_curves_and_their_pieces_hold(start, goal, radius):
     path_of(chain.cut(radius, 1.7), radius).check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(PROBLEMS))
 def test_tree_and_path_hold_after_every_step(kind, seed):
@@ -62,6 +63,7 @@ def test_tree_and_path_hold_after_every_step(kind, seed):
             assert tree.costs[search.best] == path.length == search.length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(PROBLEMS))
 def test_answers_hold_and_those_on_the_way_to_them(kind, seed):

@@ -106,6 +106,7 @@ def test_rrt_star_chooses_the_cheapest_free_parent_among_the_near(map):
     assert added > 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("map", MAPS)
 def test_rrt_star_rewires_just_those_near_that_gain(map):
     inner = Inner(map, first_free_pose(map), 0.5)

@@ -141,6 +141,7 @@ def test_unknown_space_is_named_as_the_cause(planner):
     assert plan(allowed, settings(planner)).status == Status.NONE
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("goal", [(10.1, 3.0, 0.5), (0.0, -3.0, 0.5), (0.3, 3.0, -2.0)])
 @pytest.mark.parametrize("any_heading", [False, True])

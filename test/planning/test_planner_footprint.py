@@ -64,6 +64,7 @@ def test_a_long_vehicle_drives_through_a_gap_that_its_disc_does_not(map, planner
     assert checked(Problem(map, disc, (1.5, 2.0, 0.0), (6.5, 6.0, 0.0)), planner=planner).status == Status.NO_VALID_PATH
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("width, status", [(0.602, Status.NONE), (0.599, Status.NO_VALID_PATH)])
 def test_a_gap_that_just_passes_and_just_fails(width, status):
@@ -72,6 +73,7 @@ def test_a_gap_that_just_passes_and_just_fails(width, status):
     assert checked(problem, samples=100).status == status
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("seed", range(5))
 def test_a_car_parks_forward_between_two_others(seed):

@@ -69,6 +69,7 @@ def assert_close(pose, other):
     assert abs(math.remainder(pose[2] - other[2], math.tau)) <= 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"step_size": 1.5}, {"planner": "rrt_star", "samples": scaled(300, least=50)}])
 def test_a_polished_path_is_as_free_and_never_longer(options):
     gains = []

@@ -13,7 +13,7 @@ POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIM
 COUNT = 150 if SCALE == 1 else 15
 
 
-@pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
+@pytest.mark.parametrize("planner", ["rrt", pytest.param("rrt_star", marks=pytest.mark.slow)])
 def test_random_problems(planner):
     rng = np.random.default_rng({"rrt": 1, "rrt_star": 2}[planner])
     statuses = []

@@ -100,6 +100,7 @@ def test_rrt_polishes_its_one_path():
     np.testing.assert_array_equal(search.tree.poses[:plain.size], plain.tree.poses)
 
 
+@pytest.mark.slow
 @needs_compiled
 @pytest.mark.parametrize("shortcut", [False, True])
 @pytest.mark.parametrize("informed", [False, True])

@@ -72,6 +72,7 @@ def test_on_an_open_field_positions_are_uniform_over_the_ellipse(never_near, bes
     assert np.ptp(poses[:, 2]) > 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["grid", "maze", "polygons"])
 def test_no_place_is_left_out_that_a_shorter_path_may_lead_over(never_near, kind):
     """All that plain samples find below the length, informed ones come near to; and they lie in squares that reach below it."""

@@ -75,6 +75,7 @@ def test_another_seed_gives_another_tree(problem):
     assert contents(searched(problem, seed=2)) != contents(searched(problem))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"step_size": 0.8}, {"shortcut": False}, {"informed": False}, {"planner": "rrt"}])
 def test_a_smaller_budget_is_the_beginning_of_a_larger_one(problem, options, monkeypatch):
     """So a plan that was cut short can be had again with the samples that it took; and more of them never give a longer path."""
@@ -104,6 +105,7 @@ def test_the_first_path_is_polished_and_another_sought_before_the_first_sample(p
     assert lengths == sorted(lengths, reverse=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(30, least=3)))
 def test_the_best_path_on_random_problems(seed):
     """Its length never rises, it reaches the goal free, no bound is above it, and the tree holds its invariants."""
@@ -136,6 +138,7 @@ def test_the_best_path_on_random_problems(seed):
         assert search.length >= bound - 1e-9
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_what_is_left_out_would_not_have_helped():
     """Without pruning, and with more samples, no path is shorter by more than what the samples' chance makes."""
@@ -154,6 +157,7 @@ def test_what_is_left_out_would_not_have_helped():
     assert np.mean(ratios) < 1.001
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
     """While the bounds are still computed beside it."""

@@ -29,6 +29,7 @@ def grown(kind="grid", seed=1, **options):
     return finish(search_on(problem, settings)), field
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 @pytest.mark.parametrize("step_size", [0.0, 0.4])

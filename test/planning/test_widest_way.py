@@ -59,6 +59,7 @@ def crowded_problem(rng):
     return Problem(map, Vehicle(0.5, radius), (*start.tolist(), 0.0), (*goal.tolist(), 0.0), goal_tolerance_xy=tolerance)
 
 
+@pytest.mark.slow
 def test_the_widest_way_is_as_wide_as_it_says_and_hardly_narrower_than_any():
     """By shapely, on grids and polygons: what is left of the free space when its edge is moved inwards."""
     rng = np.random.default_rng(5)
@@ -81,6 +82,7 @@ def test_the_widest_way_is_as_wide_as_it_says_and_hardly_narrower_than_any():
     assert narrow > 3
 
 
+@pytest.mark.slow
 def test_random_problems_have_true_reasons():
     """What is refused before the search cannot be solved, by shapely."""
     rng = np.random.default_rng(11)
