@@ -76,7 +76,7 @@ def test_the_judge_of_published_poses_misses_nothing():
     assert not audit_path(driven(poses, 2.001), problem).ok
     for index in (1, len(poses) // 2, -2):
         theta = poses[index, 2]
-        for aside in ((-math.sin(theta), math.cos(theta), 0.0), (0.0, 0.0, 1.0)):
+        for row_gap in ((-math.sin(theta), math.cos(theta), 0.0), (0.0, 0.0, 1.0)):
             moved = poses.copy()
-            moved[index] += 1e-4 * np.array(aside)
+            moved[index] += 1e-4 * np.array(row_gap)
             assert "jumps" in audit_path(driven(moved, 2.0), problem).findings[0]

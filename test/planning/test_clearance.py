@@ -244,7 +244,7 @@ def random_grid(rng, shape, share, resolution=0.05):
 def assert_same(found, expected):
     """Bit for bit the same field, and the same exact distances."""
     np.testing.assert_array_equal(np.asarray(found.kernel.field), np.asarray(expected.kernel.field))
-    np.testing.assert_array_equal(np.asarray(found.kernel.aside), np.asarray(expected.kernel.aside))
+    np.testing.assert_array_equal(np.asarray(found.kernel.row_gap), np.asarray(expected.kernel.row_gap))
 
 
 @pytest.mark.parametrize("share", [0, 0.001, 0.1, 0.9, 1])
@@ -263,7 +263,7 @@ def test_a_changed_map_has_the_field_of_a_new_one(seed, share, new_share):
     rng = np.random.default_rng(seed)
     old = random_grid(rng, rng.integers(1, (60, 250)), share)
     before = ClearanceField(old)
-    kept = np.array(before.kernel.field), np.array(before.kernel.aside)
+    kept = np.array(before.kernel.field), np.array(before.kernel.row_gap)
     data = old.data.copy()
     row, column = rng.integers(0, data.shape)
     box = data[row:row + rng.integers(1, 12), column:column + rng.integers(1, 30)]
@@ -274,7 +274,7 @@ def test_a_changed_map_has_the_field_of_a_new_one(seed, share, new_share):
     points = random_points(rng, changed, 20)
     np.testing.assert_array_equal(found.at(points), ClearanceField(changed).at(points))
     np.testing.assert_array_equal(np.asarray(before.kernel.field), kept[0])
-    np.testing.assert_array_equal(np.asarray(before.kernel.aside), kept[1])
+    np.testing.assert_array_equal(np.asarray(before.kernel.row_gap), kept[1])
 
 
 @pytest.mark.parametrize("previous", [

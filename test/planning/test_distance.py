@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 from support import naive
 from support.cases import scaled
 
-from dubins_rrt_ros.planning._kernels.distance import fill_columns, look_aside
+from dubins_rrt_ros.planning._kernels.distance import fill_columns, measure_row_gaps
 
 SHAPES = [(1, 1), (1, 30), (30, 1), (2, 2), (7, 8), (8, 7), (20, 150), (150, 20)]
 SHARES = [0, 0.01, 0.2, 0.9, 1]
 
 
 def looked_aside(blocked):
-    aside = np.full(blocked.shape, -1, np.int32)
-    look_aside((~blocked).view(np.uint8), aside)
-    return aside
+    row_gap = np.full(blocked.shape, -1, np.int32)
+    measure_row_gaps((~blocked).view(np.uint8), row_gap)
+    return row_gap
 
 
 def squared_distances(blocked, columns=None):
@@ -46,11 +46,11 @@ def test_distances_in_random_grids(rows, columns, share, seed):
 def test_next_cells_in_a_row(share):
     """Both are told, but that the farther one counts as one farther than the nearer."""
     blocked = np.random.default_rng(2).random((12, 15)) < share
-    aside, expected = looked_aside(blocked), naive.next_in_row(blocked)
+    row_gap, expected = looked_aside(blocked), naive.next_in_row(blocked)
     nearer = expected.min(axis=-1)
-    np.testing.assert_array_equal(aside >> 2, nearer)
-    np.testing.assert_array_equal((aside >> 2) + (aside & 1), np.minimum(expected[..., 0], nearer + 1))
-    np.testing.assert_array_equal((aside >> 2) + (aside >> 1 & 1), np.minimum(expected[..., 1], nearer + 1))
+    np.testing.assert_array_equal(row_gap >> 2, nearer)
+    np.testing.assert_array_equal((row_gap >> 2) + (row_gap & 1), np.minimum(expected[..., 0], nearer + 1))
+    np.testing.assert_array_equal((row_gap >> 2) + (row_gap >> 1 & 1), np.minimum(expected[..., 1], nearer + 1))
 
 
 @pytest.mark.parametrize("first, last", [(0, 1), (0, 64), (63, 65), (5, 5), (60, 140), (149, 150)])

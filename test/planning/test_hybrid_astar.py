@@ -35,13 +35,13 @@ def first_path(problem, portion=256):
     return None, runs
 
 
-def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000, crowding=0.0):
+def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000, visit_penalty=0.0):
     """One run."""
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
     return HybridAStar(field.body(problem.vehicle), radius, problem.start, np.array([problem.goal]),
                        DistanceField.to_goal(problem, field).kernel, corners.min(axis=0), np.ptp(corners, axis=0),
-                       arc * radius, sectors, weight, crowding, limit, most)
+                       arc * radius, sectors, weight, visit_penalty, limit, most)
 
 
 def finished(search, portion=1000):
@@ -188,8 +188,8 @@ def test_a_passage_that_the_vehicle_cannot_turn_into_is_given_up_sooner_where_cr
     data[80:90, 100] = data[120:130, 110] = 0
     problem = Problem(GridMap(data, 0.1), Vehicle(2.0, 0.2), (3.0, 8.5, 0.0), (17.0, 8.5, 0.0))
     expanded = []
-    for crowding in (0.0, 1.0):
-        search = search_on(problem, arc=0.5, weight=2.0, crowding=crowding)
+    for visit_penalty in (0.0, 1.0):
+        search = search_on(problem, arc=0.5, weight=2.0, visit_penalty=visit_penalty)
         check(finished(search), problem)
         expanded.append(search.expanded)
     assert expanded[1] < 0.85 * expanded[0]
@@ -268,7 +268,7 @@ def test_a_lattice_remembers_the_costs_of_its_cells():
     for _ in range(scaled(40, least=4)):
         corner, extent, side = rng.uniform(-50, 50, 2), rng.uniform(0.1, 9, 2), rng.uniform(0.2, 1)
         sectors = int(rng.integers(1, 40))
-        lattice, costs, seen = interpreted("lattice").Lattice(corner, extent, side, sectors), {}, 0
+        lattice, costs, seen = interpreted("closed_set").ClosedSet(corner, extent, side, sectors), {}, 0
         for pose in np.column_stack([corner + rng.random((1500, 2)) * extent, rng.uniform(-9, 9, 1500)]).tolist():
             cell = (int((pose[0] - corner[0]) // side), int((pose[1] - corner[1]) // side),
                     int((pose[2] % math.tau) // (math.tau / sectors)))

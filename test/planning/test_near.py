@@ -9,8 +9,8 @@ from support import naive
 from support.cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, Tree, Vehicle
-from dubins_rrt_ros.planning._kernels.grow import Grower
 from dubins_rrt_ros.planning._kernels.near import takes_half_circle
+from dubins_rrt_ros.planning._kernels.rrt import RrtKernel
 from dubins_rrt_ros.planning._kernels.tree import SearchTree
 from dubins_rrt_ros.planning.curves.dubins import shortest
 from dubins_rrt_ros.planning.search.rrt import MOST_NEAR, NEAR_FACTOR
@@ -28,7 +28,7 @@ class Inner:
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.grown = SearchTree(root, radius, low, high - low)
-        self.grower = Grower(self.grown, self.field.body(VEHICLE), step, NEAR_FACTOR, MOST_NEAR,
+        self.grower = RrtKernel(self.grown, self.field.body(VEHICLE), step, NEAR_FACTOR, MOST_NEAR,
                              (1e6, 1e6, 0.0), 0.0, 0.0)
 
     def add(self, sample, algorithm="rrt_star"):
@@ -185,10 +185,10 @@ def test_nodes_that_are_forgotten_are_no_neighbours(algorithm):
     before = inner.tree
     wanted = (before.poses[:, 0] > 0).astype(np.int8)
     wanted[0] = 1
-    inner.grown.index_only(wanted)
+    inner.grown.prune_index(wanted)
     for sample in samples[len(samples) // 2:]:
         inner.add(sample, algorithm)
-        inner.grown.spread()
+        inner.grown.rehash()
     after, known = inner.tree, len(before)
     assert len(after) > known + 5
     new = after.parents[known:]
@@ -226,7 +226,7 @@ def test_more_buckets_find_the_same_neighbours():
         for i, sample in enumerate(samples_on(MAPS[2], scaled(4000, least=100))):
             inner.add(sample)
             if spread and i % 100 == 99:
-                inner.grown.spread()
+                inner.grown.rehash()
         trees.append(inner.tree)
     assert len(trees[0]) == len(trees[1]) > scaled(2100)
     np.testing.assert_array_equal(trees[0].poses, trees[1].poses)

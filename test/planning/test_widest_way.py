@@ -12,7 +12,7 @@ from support.cases import SCALE, boxes_grid, holed_polygons, naive_clearance, sc
 from support.naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
-from dubins_rrt_ros.planning._kernels.widest import Flood
+from dubins_rrt_ros.planning._kernels.widest_path import WidestPathSearch
 from dubins_rrt_ros.planning.collision.clearance import MARGIN
 from dubins_rrt_ros.planning.diagnosis.bounds import are_separated, lattice_spacing, widest_way
 from dubins_rrt_ros.planning.diagnosis.explain import before_search
@@ -33,8 +33,9 @@ def test_the_flood_finds_the_widest_way(seed):
     start, *targets = (tuple(at) for at in rng.integers(0, shape, (4, 2)).tolist())
     is_target = np.zeros(shape, np.int8)
     is_target[tuple(np.transpose(targets))] = 1
-    flood = Flood(ClearanceField(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least, enough)
-    found, way = flood.widest_way(start[0] * shape[1] + start[1])
+    search = WidestPathSearch(ClearanceField(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least,
+                              enough)
+    found, way = search.widest_path(start[0] * shape[1] + start[1])
     assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
     if found == 0:
         assert len(way) == 0

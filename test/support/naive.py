@@ -96,9 +96,9 @@ def clearance_in_grid(points, blocked, resolution, origin):
     rows, columns = blocked.shape
     out = np.minimum(np.minimum(x, columns * resolution - x), np.minimum(y, rows * resolution - y)).clip(min=0)
     for row, column in np.argwhere(blocked):
-        aside = np.maximum(np.maximum(column * resolution - x, x - (column + 1) * resolution), 0)
+        row_gap = np.maximum(np.maximum(column * resolution - x, x - (column + 1) * resolution), 0)
         above = np.maximum(np.maximum(row * resolution - y, y - (row + 1) * resolution), 0)
-        out = np.minimum(out, np.hypot(aside, above))
+        out = np.minimum(out, np.hypot(row_gap, above))
     return out
 
 

@@ -241,8 +241,8 @@ def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead:
         if dx * (left + right - 2 * x) + dy * (low + high - 2 * y) < 0:
             dx, dy = -dx, -dy
     away = math.hypot(dx, dy)
-    aside = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
+    row_gap = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
     above = {-1: "top", 0: "center", 1: "bottom"}[round(dy / away)]
     halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
-    axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=aside, va=above, path_effects=halo,
+    axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=row_gap, va=above, path_effects=halo,
               zorder=7)

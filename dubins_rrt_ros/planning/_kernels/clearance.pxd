@@ -6,11 +6,11 @@ cdef class Clearance:
     cdef readonly double width, height
     cdef double exact(self, double x, double y) noexcept nogil
     cdef double at_least(self, double x, double y, double enough) noexcept nogil
-    cdef bint free(self, double x, double y, double need) noexcept nogil
+    cdef bint free(self, double x, double y, double required_clearance) noexcept nogil
     cdef double arc_is_free(self, double x, double y, double theta, double radius, int turn, double length, double s,
-                            double need) noexcept nogil
+                            double required_clearance) noexcept nogil
     cdef bint curve_is_free(self, double x, double y, double theta, double radius, int word,
-                            double first, double second, double third, double need) noexcept nogil
+                            double first, double second, double third, double required_clearance) noexcept nogil
     cdef bint sweep_is_clear(self, double[:, ::1] corners, int first, int end, double along, double across,
                              double[:, ::1] spans) noexcept nogil
     cdef void span(self, double x0, double y0, double x1, double y1, double[:, ::1] spans) noexcept nogil
@@ -20,7 +20,7 @@ cdef class Clearance:
                               int end, double along, double across) noexcept nogil
 
 cdef class GridClearance(Clearance):
-    cdef readonly int[:, ::1] aside
+    cdef readonly int[:, ::1] row_gap
     cdef double squared_across(self, double x, int row, int column) noexcept nogil
 
 cdef class PolygonClearance(Clearance):

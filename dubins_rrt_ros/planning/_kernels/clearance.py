@@ -4,10 +4,11 @@
 A field holds, for each cell of a raster over the map, a lower bound of the clearance anywhere in the cell. Where it does
 not decide, the exact distance does: to the squares of a grid's occupied cells, or to the edges of polygons.
 
-What the walk guarantees. The clearance changes by at most a metre per metre (it is 1-Lipschitz). A sample is taken as free
-where its clearance is at least `need + margin`; the next one lies `clearance - need + margin / 2` ahead. Between two such
-samples s apart, with clearances c and c', the clearance is at least (c + c' - s) / 2 >= need + margin / 4. So a curve that
-passes has a clearance above `need` everywhere, and one that keeps `need + margin` always passes.
+What the walk guarantees (conservative advancement). The clearance changes by at most a metre per metre (it is 1-Lipschitz). A
+sample is taken as free where its clearance is at least `required_clearance + margin`; the next one lies
+`clearance - required_clearance + margin / 2` ahead. Between two such samples s apart, with clearances c and c', the clearance is
+at least (c + c' - s) / 2 >= required_clearance + margin / 4. So a curve that passes has more than the required clearance
+everywhere, and one that keeps `required_clearance + margin` always passes.
 """
 
 import cython
@@ -62,21 +63,21 @@ class Clearance:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def free(self, x: cython.double, y: cython.double, need: cython.double) -> cython.bint:
-        """Whether the clearance at a point is at least `need + margin`."""
-        return self.at_least(x, y, need + self.margin) >= need + self.margin
+    def free(self, x: cython.double, y: cython.double, required_clearance: cython.double) -> cython.bint:
+        """Whether the clearance at a point is at least `required_clearance + margin`."""
+        return self.at_least(x, y, required_clearance + self.margin) >= required_clearance + self.margin
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def arc_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
-                    length: cython.double, s: cython.double, need: cython.double) -> cython.double:
+                    length: cython.double, s: cython.double, required_clearance: cython.double) -> cython.double:
         """Walk an arc from `s` on; by how much the next sample lies beyond its end, or -1 where it hits."""
         if s > length:
             return s - length
         sin_theta: cython.double = sin(theta)
         cos_theta: cython.double = cos(theta)
-        worth_exact: cython.double = need + self.margin + self.resolution
+        worth_exact: cython.double = required_clearance + self.margin + self.resolution
         found: cython.double
         px: cython.double
         py: cython.double
@@ -84,30 +85,31 @@ class Clearance:
         while s <= length:
             px, py, ptheta = drive_from(x, y, theta, sin_theta, cos_theta, radius, turn, s)
             found = self.at_least(px, py, worth_exact)
-            if found < need + self.margin:
+            if found < required_clearance + self.margin:
                 return -1
-            s += found - need + self.margin / 2
+            s += found - required_clearance + self.margin / 2
         return s - length
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def curve_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double, need: cython.double) -> cython.bint:
-        """Whether a curve keeps the clearance `need`; see the module's guarantee."""
-        rest: cython.double = self.arc_is_free(x, y, theta, radius, turn_of(word, 0), first, 0, need)
+                      first: cython.double, second: cython.double, third: cython.double,
+                      required_clearance: cython.double) -> cython.bint:
+        """Whether a curve keeps the clearance `required_clearance`; see the module's guarantee."""
+        rest: cython.double = self.arc_is_free(x, y, theta, radius, turn_of(word, 0), first, 0, required_clearance)
         if rest < 0:
             return False
         x, y, theta = drive(x, y, theta, radius, turn_of(word, 0), first)
-        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 1), second, rest, need)
+        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 1), second, rest, required_clearance)
         if rest < 0:
             return False
         x, y, theta = drive(x, y, theta, radius, turn_of(word, 1), second)
-        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 2), third, rest, need)
+        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 2), third, rest, required_clearance)
         if rest < 0:
             return False
         x, y, theta = drive(x, y, theta, radius, turn_of(word, 2), third)
-        return self.free(x, y, need)
+        return self.free(x, y, required_clearance)
 
     @cython.cfunc
     @cython.nogil
@@ -202,21 +204,22 @@ class Clearance:
                 out[i] = self.at_least(points[i, 0], points[i, 1], 1e300)
 
     def is_curve_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double, need: cython.double) -> bool:
-        """Whether a curve keeps the clearance `need`; see the module's guarantee."""
-        return self.curve_is_free(x, y, theta, radius, word, first, second, third, need)
+                      first: cython.double, second: cython.double, third: cython.double,
+                      required_clearance: cython.double) -> bool:
+        """Whether a curve keeps the clearance `required_clearance`; see the module's guarantee."""
+        return self.curve_is_free(x, y, theta, radius, word, first, second, third, required_clearance)
 
 
 @cython.cclass
 class GridClearance(Clearance):
     """Clearance from the squares of occupied cells.
 
-    `aside` holds for each cell how far away the next occupied ones in its row are, as `distance.look_aside` writes it.
+    `row_gap` holds for each cell how far away the next occupied ones in its row are, as `distance.measure_row_gaps` writes it.
     """
 
-    def __init__(self, field, resolution, origin, margin, aside):
+    def __init__(self, field, resolution, origin, margin, row_gap):
         Clearance.__init__(self, field, resolution, origin, margin)
-        self.aside = aside
+        self.row_gap = row_gap
 
     @cython.cfunc
     @cython.nogil
@@ -224,12 +227,12 @@ class GridClearance(Clearance):
     @cython.exceptval(check=False)
     def squared_across(self, x: cython.double, row: cython.int, column: cython.int) -> cython.double:
         """The squared distance along x to the nearest occupied square of a row."""
-        aside: cython.int = self.aside[row, column]
-        if aside == 0:
+        row_gap: cython.int = self.row_gap[row, column]
+        if row_gap == 0:
             return 0
         # The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
-        left: cython.int = (aside >> 2) + (aside & 1)
-        right: cython.int = (aside >> 2) + (aside >> 1 & 1)
+        left: cython.int = (row_gap >> 2) + (row_gap & 1)
+        right: cython.int = (row_gap >> 2) + (row_gap >> 1 & 1)
         gap: cython.double = min(x - (column - left + 1) * self.resolution, (column + right) * self.resolution - x)
         return gap * gap
 
@@ -267,15 +270,15 @@ class GridClearance(Clearance):
         row: cython.int
         column: cython.int
         last: cython.int
-        aside: cython.int
+        row_gap: cython.int
         for row in range(first_row, last_row + 1):
             column = self.column_of(spans[row, 0])
             last = self.column_of(spans[row, 1])
             while column <= last:
-                aside = self.aside[row, column]
-                if aside == 0:
+                row_gap = self.row_gap[row, column]
+                if row_gap == 0:
                     return False
-                column += (aside >> 2) + (aside >> 1 & 1)
+                column += (row_gap >> 2) + (row_gap >> 1 & 1)
         return True
 
 

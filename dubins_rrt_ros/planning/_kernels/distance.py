@@ -13,7 +13,7 @@ import numpy as np
 TOGETHER = cython.declare(cython.int, 64)
 
 
-def look_aside(free: cython.uchar[:, ::1], aside: cython.int[:, ::1]):
+def measure_row_gaps(free: cython.uchar[:, ::1], row_gap: cython.int[:, ::1]):
     """Find the next blocked cells to the left and to the right of each cell in its row; it can be itself.
 
     Args:
@@ -31,24 +31,24 @@ def look_aside(free: cython.uchar[:, ::1], aside: cython.int[:, ::1]):
             left = 0
             for column in range(columns):
                 left = (left + 1) * cython.cast(cython.int, free[row, column])
-                aside[row, column] = left
+                row_gap[row, column] = left
             right = 0
             for column in range(columns - 1, -1, -1):
                 right = (right + 1) * cython.cast(cython.int, free[row, column])
-                left = aside[row, column]
-                aside[row, column] = 4 * min(left, right) + (left > right) + 2 * (right > left)
+                left = row_gap[row, column]
+                row_gap[row, column] = 4 * min(left, right) + (left > right) + 2 * (right > left)
 
 
-def fill_columns(aside: cython.int[:, ::1], first: cython.int, last: cython.int, of_squared: cython.float[::1],
+def fill_columns(row_gap: cython.int[:, ::1], first: cython.int, last: cython.int, of_squared: cython.float[::1],
                  out: cython.float[:, ::1]):
     """Write a function of the squared distance to the columns from `first` up to `last`, without that.
 
     Args:
-        aside: (rows, columns) int32, what `look_aside` finds.
+        aside: (rows, columns) int32, what `measure_row_gaps` finds.
         of_squared: float32, its value for each squared distance, up to that of a cell in the middle to the outside.
         out: (rows, columns) float32.
     """
-    rows: cython.int = cython.cast(cython.int, aside.shape[0])
+    rows: cython.int = cython.cast(cython.int, row_gap.shape[0])
     squared: cython.int[:, ::1] = np.empty((TOGETHER, rows + 2), np.int32)
     apex: cython.longlong[::1] = np.empty(rows + 2, np.int64)
     height: cython.longlong[::1] = np.empty(rows + 2, np.int64)
@@ -64,7 +64,7 @@ def fill_columns(aside: cython.int[:, ::1], first: cython.int, last: cython.int,
             count = min(TOGETHER, last - column)
             for row in range(rows):
                 for i in range(count):
-                    squared[i, row + 1] = aside[row, column + i] >> 2
+                    squared[i, row + 1] = row_gap[row, column + i] >> 2
             for i in range(count):
                 envelope(squared[i], apex, height, begin)
             for row in range(rows):

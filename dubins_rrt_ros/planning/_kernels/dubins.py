@@ -332,19 +332,19 @@ def pose_along(x: cython.double, y: cython.double, theta: cython.double, radius:
 
 
 def poses_along(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                first: cython.double, second: cython.double, third: cython.double, stations: cython.double[::1],
+                first: cython.double, second: cython.double, third: cython.double, arc_lengths: cython.double[::1],
                 out: cython.double[:, ::1]):
-    """Write the poses at the arc lengths `stations` to `out` (n, 3), headings in [-pi, pi] but for the first."""
+    """Write the poses at the arc lengths `arc_lengths` to `out` (n, 3), headings in [-pi, pi] but for the first."""
     i: cython.Py_ssize_t
-    for i in range(stations.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = along(x, y, theta, radius, word, first, second, third, stations[i])
+    for i in range(arc_lengths.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = along(x, y, theta, radius, word, first, second, third, arc_lengths[i])
         if i > 0:
             out[i, 2] = remainder(out[i, 2], TWO_PI)
 
 
 def chain_poses(poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], radius: cython.double,
-                curves: cython.long[::1], stations: cython.double[::1], out: cython.double[:, ::1]):
-    """Write the poses at the arc lengths `stations` of a chain's `curves` to `out` (m, 3), headings in [-pi, pi].
+                curves: cython.long[::1], arc_lengths: cython.double[::1], out: cython.double[:, ::1]):
+    """Write the poses at the arc lengths `arc_lengths` of a chain's `curves` to `out` (m, 3), headings in [-pi, pi].
 
     Curve i leads from pose i to pose i + 1, whose word and lengths are its own.
     """
@@ -354,14 +354,15 @@ def chain_poses(poses: cython.double[:, ::1], words: cython.schar[::1], lengths:
         for i in range(curves.shape[0]):
             pose = curves[i]
             out[i, 0], out[i, 1], out[i, 2] = along(poses[pose, 0], poses[pose, 1], poses[pose, 2], radius, words[pose + 1],
-                                                    lengths[pose + 1, 0], lengths[pose + 1, 1], lengths[pose + 1, 2], stations[i])
+                                                    lengths[pose + 1, 0], lengths[pose + 1, 1], lengths[pose + 1, 2],
+                                                    arc_lengths[i])
             out[i, 2] = remainder(out[i, 2], TWO_PI)
 
 
 def edge_points(poses: cython.double[:, ::1], parents: cython.int[::1], words: cython.schar[::1],
-                lengths: cython.double[:, ::1], radius: cython.double, edges: cython.long[::1], stations: cython.double[::1],
+                lengths: cython.double[:, ::1], radius: cython.double, edges: cython.long[::1], arc_lengths: cython.double[::1],
                 out: cython.double[:, :]):
-    """Write the positions at the arc lengths `stations` of a tree's `edges` to `out` (m, 2)."""
+    """Write the positions at the arc lengths `arc_lengths` of a tree's `edges` to `out` (m, 2)."""
     i: cython.Py_ssize_t
     node: cython.Py_ssize_t
     parent: cython.Py_ssize_t
@@ -371,4 +372,4 @@ def edge_points(poses: cython.double[:, ::1], parents: cython.int[::1], words: c
             node = edges[i]
             parent = parents[node]
             out[i, 0], out[i, 1], theta = along(poses[parent, 0], poses[parent, 1], poses[parent, 2], radius, words[node],
-                                                lengths[node, 0], lengths[node, 1], lengths[node, 2], stations[i])
+                                                lengths[node, 0], lengths[node, 1], lengths[node, 2], arc_lengths[i])

@@ -54,7 +54,7 @@ class Eikonal:
         self.width, self.size = free.shape[1], free.size
         self.free = free.reshape(-1)
         self.cost = np.full(free.size, FAR)
-        self.is_slowed = False  # before, all gradients are 1
+        self.has_gradients = False  # before, all gradients are 1
         self.state = np.zeros(free.size, np.int8)
         self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
         self.rank = np.full(free.size, free.size, np.int32)
@@ -85,18 +85,18 @@ class Eikonal:
     def flatten(self):
         """Make the costs lower where they are too steep, once; there must have been no target."""
         self.finish()
-        self.gradient, self.slope, self.is_slowed = np.ones(self.size), np.zeros(self.size), True
+        self.gradient, self.slope, self.has_gradients = np.ones(self.size), np.zeros(self.size), True
         _: cython.int
         with cython.nogil:
             levels: cython.double = self.limit * LEVELS  # no cost is above the limit, and none rises
             self.limit = FAR
             for _ in range(REPEATS):
-                self.slow_down()
+                self.reduce_slopes()
         steepest: cython.double[::1] = np.ones(int(levels) + 2)
         heights: cython.double[::1] = np.zeros(steepest.shape[0])
         with cython.nogil:
             self.find_steepest(steepest)
-            self.press(steepest, heights)
+            self.compress(steepest, heights)
 
     @cython.cfunc
     @cython.nogil
@@ -121,7 +121,7 @@ class Eikonal:
                 for corner in range(4):
                     node = (i + (corner >> 1)) * self.width + j + (corner & 1)
                     self.rank[node] = -1
-                    self.offer(node, FLATTER * max(0.0, hypot(j + (corner & 1) - column, i + (corner >> 1) - row) - reach))
+                    self.relax(node, FLATTER * max(0.0, hypot(j + (corner & 1) - column, i + (corner >> 1) - row) - reach))
 
     @cython.cfunc
     @cython.nogil
@@ -139,9 +139,9 @@ class Eikonal:
     @cython.nogil
     @cython.inline
     @cython.exceptval(check=False)
-    def settle(self, square: cython.int) -> cython.void:
+    def ensure_final(self, square: cython.int) -> cython.void:
         """Make sure that the nodes of a free square have their costs, if they can be reached."""
-        if self.waiting + self.postponed > 0 and not self.is_settled(square):
+        if self.waiting + self.postponed > 0 and not self.is_final(square):
             self.flood_up_to(square)
 
     @cython.cfunc
@@ -149,7 +149,7 @@ class Eikonal:
     @cython.exceptval(check=False)
     def flood_up_to(self, square: cython.int) -> cython.void:
         """Raise the limit until the nodes of a square have had their turns, and once more, since others may count for them."""
-        while self.waiting + self.postponed > 0 and not self.is_settled(square):
+        while self.waiting + self.postponed > 0 and not self.is_final(square):
             self.until = self.limit + self.rise
             self.flood()
         self.until = self.limit + self.rise
@@ -159,7 +159,7 @@ class Eikonal:
     @cython.nogil
     @cython.inline
     @cython.exceptval(check=False)
-    def is_settled(self, square: cython.int) -> cython.bint:
+    def is_final(self, square: cython.int) -> cython.bint:
         """Whether all nodes of a square have had their turns."""
         return max(max(self.rank[square], self.rank[square + 1]),
                    max(self.rank[square + self.width], self.rank[square + self.width + 1])) < self.size
@@ -198,12 +198,12 @@ class Eikonal:
     def pass_on(self, node: cython.int, neighbour: cython.int) -> cython.void:
         """Let the cost of a node count for a neighbour that costs more."""
         if self.falls_behind(neighbour, node):
-            self.offer(neighbour, self.update(neighbour, self.gradient[neighbour] if self.is_slowed else 1))
+            self.relax(neighbour, self.update(neighbour, self.gradient[neighbour] if self.has_gradients else 1))
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def offer(self, node: cython.int, cost: cython.double) -> cython.void:
+    def relax(self, node: cython.int, cost: cython.double) -> cython.void:
         """Let a node have a cost that is lower than its own, and wait to pass it on: at once only where it is below the limit."""
         if cost >= self.cost[node] - self.least_fall:
             return
@@ -283,7 +283,7 @@ class Eikonal:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def slow_down(self) -> cython.void:
+    def reduce_slopes(self) -> cython.void:
         """Solve again, node by node in order, with a gradient that makes up for the steepest square around each."""
         square: cython.int
         node: cython.int
@@ -336,7 +336,7 @@ class Eikonal:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def press(self, steepest: cython.double[::1], heights: cython.double[::1]) -> cython.void:
+    def compress(self, steepest: cython.double[::1], heights: cython.double[::1]) -> cython.void:
         """Make every level so much lower that no gradient is above 1; `heights` has room for where they begin."""
         level: cython.int
         node: cython.int

@@ -4,7 +4,7 @@
 import cython
 import numpy as np
 
-from .arrays import grown
+from .arrays import resized
 
 
 @cython.cclass
@@ -19,7 +19,7 @@ class Heap:
         """Make room for `more` items."""
         if self.count + more > self.keys.shape[0]:
             capacity = self.count + max(more, self.count)
-            self.items, self.keys = grown(self.items, capacity), grown(self.keys, capacity)
+            self.items, self.keys = resized(self.items, capacity), resized(self.keys, capacity)
 
     @cython.cfunc
     @cython.nogil

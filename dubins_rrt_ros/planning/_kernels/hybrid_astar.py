@@ -13,23 +13,23 @@ would be expanded, with every heading. So a pose may count for more the more of 
 import cython
 import numpy as np
 
-from .arrays import grown
+from .arrays import resized
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
+    from cython.cimports.dubins_rrt_ros.planning._kernels.closed_set import UNSEEN, ClosedSet
+    from cython.cimports.dubins_rrt_ros.planning._kernels.collision import CollisionChecker
+    from cython.cimports.dubins_rrt_ros.planning._kernels.cost_to_go import CostToGoKernel
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, drive_from, rounding_at, shortest_within
-    from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
     from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
-    from cython.cimports.dubins_rrt_ros.planning._kernels.lattice import UNSEEN, Lattice
     from cython.cimports.libc.math import cos, remainder, sin
 else:
     from math import cos, remainder, sin
 
-    from .body import Body
+    from .closed_set import UNSEEN, ClosedSet
+    from .collision import CollisionChecker
+    from .cost_to_go import CostToGoKernel
     from .dubins import NO_CURVE, TWO_PI, drive_from, rounding_at, shortest_within
-    from .field import CostField
     from .heap import Heap
-    from .lattice import UNSEEN, Lattice
 
 #: What the lattice has as the cost of a cell whose pose was expanded.
 EXPANDED = cython.declare(cython.float, -1)
@@ -49,15 +49,15 @@ class HybridAStar:
         ended: whether a path was found, or nothing is left to expand.
     """
 
-    body: Body
+    body: CollisionChecker
     radius: cython.double
-    to_goal: CostField
+    to_goal: CostToGoKernel
     goals: cython.double[:, ::1]
     goal_headings: cython.double[:, ::1]
     rounding: cython.double
     arc: cython.double
     weight: cython.double
-    crowding: cython.double
+    visit_penalty: cython.double
     limit: cython.double
     most: cython.int
     size = cython.declare(cython.int, visibility="readonly")
@@ -68,16 +68,16 @@ class HybridAStar:
     parents: cython.int[::1]
     turns: cython.schar[::1]
     curve_may_be_free: cython.schar[::1]
-    lattice: Lattice
-    expanded_around: Lattice
+    lattice: ClosedSet
+    visits_near: ClosedSet
     open: Heap
     last: cython.int
     last_goal: cython.int
     last_word: cython.int
     last_lengths: cython.double[::1]
 
-    def __init__(self, body: Body, radius, start, goals, to_goal: CostField, corner, extent, arc, sectors, weight, crowding,
-                 limit, most):
+    def __init__(self, body: CollisionChecker, radius, start, goals, to_goal: CostToGoKernel, corner, extent, arc, sectors,
+                 weight, visit_penalty, limit, most):
         """
         Args:
             body: what must be free along all arcs.
@@ -94,9 +94,9 @@ class HybridAStar:
         self.to_goal, self.goals = to_goal, goals
         self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
-        self.arc, self.weight, self.crowding, self.limit, self.most = arc, weight, crowding, limit, most
-        self.lattice = Lattice(corner, extent, 0.7 * arc, sectors)
-        self.expanded_around = Lattice(corner, extent, 1.4 * arc, 1)  # whose costs are counts
+        self.arc, self.weight, self.visit_penalty, self.limit, self.most = arc, weight, visit_penalty, limit, most
+        self.lattice = ClosedSet(corner, extent, 0.7 * arc, sectors)
+        self.visits_near = ClosedSet(corner, extent, 1.4 * arc, 1)  # whose costs are counts
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
         self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
         self.open = Heap(0)
@@ -122,14 +122,14 @@ class HybridAStar:
     def reserve(self, more: cython.int):
         """Make room for `more` poses, so that adding them allocates nothing."""
         self.lattice.reserve(more)
-        if self.crowding > 0:
-            self.expanded_around.reserve(more)
+        if self.visit_penalty > 0:
+            self.visits_near.reserve(more)
         self.open.reserve(more)
         if self.size + more > self.parents.shape[0]:
             capacity = self.size + max(more, self.size)
-            self.poses, self.costs = grown(self.poses, capacity), grown(self.costs, capacity)
-            self.parents, self.turns = grown(self.parents, capacity), grown(self.turns, capacity)
-            self.curve_may_be_free = grown(self.curve_may_be_free, capacity)
+            self.poses, self.costs = resized(self.poses, capacity), resized(self.costs, capacity)
+            self.parents, self.turns = resized(self.parents, capacity), resized(self.turns, capacity)
+            self.curve_may_be_free = resized(self.curve_may_be_free, capacity)
 
     def path(self):
         """The path that was found: (n, 3) poses from the start on, and (n,) words and (n, 3) lengths [m] of the curves to them
@@ -159,8 +159,8 @@ class HybridAStar:
             return
         self.lattice.costs[entry] = EXPANDED
         self.expanded += 1
-        if self.crowding > 0:
-            self.expanded_around.costs[self.expanded_around.entry_at(self.poses[node, 0], self.poses[node, 1], 0)] += 1
+        if self.visit_penalty > 0:
+            self.visits_near.costs[self.visits_near.entry_at(self.poses[node, 0], self.poses[node, 1], 0)] += 1
         if self.curve_may_be_free[node] and self.reaches_goal(node):
             self.last = node
             return
@@ -222,8 +222,8 @@ class HybridAStar:
             return
         self.lattice.costs[entry] = cython.cast(cython.float, cost)
         key: cython.double = cost + self.weight * more
-        if self.crowding > 0:
-            key += self.crowding * self.arc * self.expanded_around.costs[self.expanded_around.entry_at(x, y, 0)]
+        if self.visit_penalty > 0:
+            key += self.visit_penalty * self.arc * self.visits_near.costs[self.visits_near.entry_at(x, y, 0)]
         self.add(x, y, theta, cost, node, turn, key, curve_may_be_free)
 
     @cython.cfunc

@@ -1,14 +1,14 @@
 cimport cython
 from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 
-cdef class NearSet:
+cdef class BackwardNeighbors:
     cdef SearchTree tree
     cdef int count
     cdef int wanted
-    cdef double reach
-    cdef double guess
-    cdef double usual
-    cdef double budget
+    cdef double neighbor_radius
+    cdef double radius_guess
+    cdef double typical_radius
+    cdef double cost_budget
     cdef double ahead
     cdef double x
     cdef double y
@@ -20,7 +20,7 @@ cdef class NearSet:
     cdef signed char[::1] words
     cdef double[:, ::1] lengths
     @cython.final
-    cdef void begin(self, double x, double y, double theta, double reach) noexcept nogil
+    cdef void begin(self, double x, double y, double theta, double neighbor_radius) noexcept nogil
     @cython.final
     cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
     cdef void consider(self, int node, double dx, double dy, double limit) noexcept nogil
@@ -32,5 +32,5 @@ cdef class NearSet:
     cdef void collect_useful(self, double x, double y, double theta, int wanted, double most_cost,
                              double within) noexcept nogil
 
-cdef class GainSet(NearSet):
-    cdef void collect_gaining(self, int node, double reach, double least_gain) noexcept nogil
+cdef class ForwardNeighbors(BackwardNeighbors):
+    cdef void collect_cheaper(self, int node, double neighbor_radius, double least_gain) noexcept nogil

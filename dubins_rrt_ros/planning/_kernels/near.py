@@ -22,7 +22,7 @@ else:
 
 
 #: The next near set is guessed to reach this much farther than the last.
-GUESS = cython.declare(cython.double, 1.25)
+RADIUS_GUESS_FACTOR = cython.declare(cython.double, 1.25)
 #: By what factors it is adapted how far the nearest often are: so one in five of the near sets reaches no farther.
 RISE = cython.declare(cython.double, 1.1 ** 0.2)
 FALL = cython.declare(cython.double, 1.1 ** 0.8)
@@ -33,22 +33,22 @@ HALF_DIAGONAL = cython.declare(cython.double, 0.7072)
 #: More than the rounding of a place, in turning radii.
 NEARLY = cython.declare(cython.double, 1e-9)
 #: The least guess, in turning radii: it grows by doubling, which must not begin at 0.
-LEAST_GUESS = cython.declare(cython.double, 1e-3)
+LEAST_RADIUS_GUESS = cython.declare(cython.double, 1e-3)
 
 
 @cython.cclass
-class NearSet:
+class BackwardNeighbors:
     """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
 
     `keys` are the lengths of the curves; the first `count` entries of all arrays are in use. Nodes whose curve is not
-    shorter than `reach` are of no interest; it shrinks as nodes are found. Neither are those whose curve is not shorter than
-    what their cost leaves of `budget`.
+    shorter than `neighbor_radius` are of no interest; it shrinks as nodes are found. Neither are those whose curve is not
+    shorter than what their cost leaves of `cost_budget`.
     """
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
         self.tree = tree
         self.count = 0
-        self.guess = self.usual = tree.radius
+        self.radius_guess = self.typical_radius = tree.radius
         self.ahead = -1
         self.keys = np.empty(capacity)
         self.nodes = np.empty(capacity, np.int32)
@@ -65,14 +65,17 @@ class NearSet:
         A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
         """
         self.wanted = min(min(wanted, self.tree.indexed), cython.cast(cython.int, self.keys.shape[0]))
-        self.begin(x, y, theta, min(self.guess, within))
+        self.begin(x, y, theta, min(self.radius_guess, within))
         self.consider_all()
-        while self.count < self.wanted and self.guess < within:
-            self.guess *= 2
-            self.begin(x, y, theta, min(self.guess, within))
+        while self.count < self.wanted and self.radius_guess < within:
+            self.radius_guess *= 2
+            self.begin(x, y, theta, min(self.radius_guess, within))
             self.consider_all()
-        self.guess = max(GUESS * self.reach, LEAST_GUESS * self.tree.radius)
-        self.usual = self.usual * RISE if self.reach > self.usual else self.usual / FALL
+        self.radius_guess = max(RADIUS_GUESS_FACTOR * self.neighbor_radius, LEAST_RADIUS_GUESS * self.tree.radius)
+        if self.neighbor_radius > self.typical_radius:
+            self.typical_radius = self.typical_radius * RISE
+        else:
+            self.typical_radius = self.typical_radius / FALL
 
     @cython.cfunc
     @cython.nogil
@@ -85,19 +88,19 @@ class NearSet:
         Most nodes are too expensive already by the straight line, so that few curves are computed.
         """
         self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
-        self.begin(x, y, theta, min(self.usual, within))
-        self.budget = most_cost
+        self.begin(x, y, theta, min(self.typical_radius, within))
+        self.cost_budget = most_cost
         self.consider_all()
 
     @cython.cfunc
     @cython.final
     @cython.nogil
     @cython.exceptval(check=False)
-    def begin(self, x: cython.double, y: cython.double, theta: cython.double, reach: cython.double) -> cython.void:
+    def begin(self, x: cython.double, y: cython.double, theta: cython.double, neighbor_radius: cython.double) -> cython.void:
         """Empty the set and set the pose that it is about."""
         self.count = 0
-        self.reach = reach
-        self.budget = UNLIMITED
+        self.neighbor_radius = neighbor_radius
+        self.cost_budget = UNLIMITED
         self.x, self.y, self.theta = x, y, theta
         self.sin_theta, self.cos_theta = sin(theta), cos(theta)
 
@@ -127,7 +130,7 @@ class NearSet:
         self.lengths[i, 1] = second
         self.lengths[i, 2] = third
         if self.count == self.wanted:
-            self.reach = self.keys[self.count - 1]
+            self.neighbor_radius = self.keys[self.count - 1]
 
     @cython.cfunc
     @cython.nogil
@@ -156,14 +159,14 @@ class NearSet:
         dx: cython.double
         dy: cython.double
         limit: cython.double
-        if node >= 0 and self.reach <= half_circle:
+        if node >= 0 and self.neighbor_radius <= half_circle:
             dx = self.tree.x0 + (column + 0.5) * self.tree.bucket_size - self.x
             dy = self.tree.y0 + (row + 0.5) * self.tree.bucket_size - self.y
             if takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius,
                                  HALF_DIAGONAL * self.tree.bucket_size):
                 return
         while node >= 0:
-            limit = min(self.reach, self.budget + self.ahead * self.tree.costs[node])
+            limit = min(self.neighbor_radius, self.cost_budget + self.ahead * self.tree.costs[node])
             dx = self.tree.poses[node, 0] - self.x
             dy = self.tree.poses[node, 1] - self.y
             if (limit > 0 and dx * dx + dy * dy < limit * limit and radius * turned(self.theta, self.tree.poses[node, 2]) < limit
@@ -194,7 +197,7 @@ class NearSet:
         i: cython.int
         j: cython.int
         for ring in range(rings):
-            if ring > 0 and inner + (ring - 1) * side >= self.reach:
+            if ring > 0 and inner + (ring - 1) * side >= self.neighbor_radius:
                 return
             for i in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
                 if i == row - ring or i == row + ring:
@@ -208,20 +211,20 @@ class NearSet:
 
 
 @cython.cclass
-class GainSet(NearSet):
+class ForwardNeighbors(BackwardNeighbors):
     """The nodes that would be cheaper if they were reached *from* a node, within reach, with the curves to them."""
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
-        NearSet.__init__(self, tree, capacity)
+        BackwardNeighbors.__init__(self, tree, capacity)
         self.ahead = 1
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def collect_gaining(self, node: cython.int, reach: cython.double, least_gain: cython.double) -> cython.void:
-        """Find the nodes that gain more than `least_gain` by a curve shorter than `reach` from `node`."""
-        self.begin(self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2], reach)
-        self.budget = -(self.tree.costs[node] + least_gain)
+    def collect_cheaper(self, node: cython.int, neighbor_radius: cython.double, least_gain: cython.double) -> cython.void:
+        """Find the nodes that gain more than `least_gain` by a curve shorter than `neighbor_radius` from `node`."""
+        self.begin(self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2], neighbor_radius)
+        self.cost_budget = -(self.tree.costs[node] + least_gain)
         self.consider_all()
 
     @cython.cfunc

@@ -4,7 +4,7 @@
 import cython
 import numpy as np
 
-from .arrays import grown
+from .arrays import resized
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import rounding_at
@@ -63,16 +63,16 @@ class SearchTree:
         if self.size + more <= self.parents.shape[0]:
             return
         capacity = max(self.size + more, 2 * self.size)
-        self.poses = grown(self.poses, capacity)
-        self.headings = grown(self.headings, capacity)
-        self.parents = grown(self.parents, capacity)
-        self.costs = grown(self.costs, capacity)
-        self.words = grown(self.words, capacity)
-        self.lengths = grown(self.lengths, capacity)
-        self.first_child = grown(self.first_child, capacity)
-        self.next_sibling = grown(self.next_sibling, capacity)
-        self.previous_sibling = grown(self.previous_sibling, capacity)
-        self.next_in_bucket = grown(self.next_in_bucket, capacity)
+        self.poses = resized(self.poses, capacity)
+        self.headings = resized(self.headings, capacity)
+        self.parents = resized(self.parents, capacity)
+        self.costs = resized(self.costs, capacity)
+        self.words = resized(self.words, capacity)
+        self.lengths = resized(self.lengths, capacity)
+        self.first_child = resized(self.first_child, capacity)
+        self.next_sibling = resized(self.next_sibling, capacity)
+        self.previous_sibling = resized(self.previous_sibling, capacity)
+        self.next_in_bucket = resized(self.next_in_bucket, capacity)
 
     @cython.cfunc
     @cython.nogil
@@ -143,7 +143,7 @@ class SearchTree:
         self.buckets[row, column] = node
         self.indexed += 1
 
-    def index_only(self, wanted: cython.schar[::1]):
+    def prune_index(self, wanted: cython.schar[::1]):
         """Let only those of the (size,) nodes that are not 0 be found as neighbours from now on."""
         node: cython.int
         self.buckets[:, :] = -1
@@ -153,7 +153,7 @@ class SearchTree:
                 if wanted[node]:
                     self.index(node)
 
-    def spread(self):
+    def rehash(self):
         """Make more buckets, if there are many nodes for each. To be called at moments that depend on the samples alone."""
         count: cython.int = self.buckets.shape[0] * self.buckets.shape[1]
         if self.indexed <= MOST_PER_BUCKET * count or count >= MOST_BUCKETS:
@@ -166,7 +166,7 @@ class SearchTree:
             nodes = following[nodes]
             nodes = nodes[nodes >= 0]
         self.make_buckets(self.indexed)
-        self.index_only(wanted)
+        self.prune_index(wanted)
 
     def make_buckets(self, count):
         """Make about `count` buckets, all empty."""

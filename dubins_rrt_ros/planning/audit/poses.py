@@ -93,13 +93,13 @@ def _motion_findings(poses: np.ndarray, steps: _Steps, radius: float, tolerance_
     """What no car of the turning radius does."""
     if not len(steps.turn):
         return []
-    allowed, aside = steps.length / radius * (1 + TOLERANCE), tolerance_yaw * steps.length
+    allowed, row_gap = steps.length / radius * (1 + TOLERANCE), tolerance_yaw * steps.length
     findings = []
     for excess, tolerance, does in (
             (steps.turn - allowed, tolerance_yaw, f"turns left {{:.6f}} rad more than a radius of {radius:g} m allows"),
             (-steps.turn - allowed, tolerance_yaw, f"turns right {{:.6f}} rad more than a radius of {radius:g} m allows"),
-            (steps.left - aside, tolerance_xy, "runs {:.6f} m more to the left than its yaw allows"),
-            (-steps.left - aside, tolerance_xy, "runs {:.6f} m more to the right than its yaw allows"),
+            (steps.left - row_gap, tolerance_xy, "runs {:.6f} m more to the left than its yaw allows"),
+            (-steps.left - row_gap, tolerance_xy, "runs {:.6f} m more to the right than its yaw allows"),
             (-steps.ahead, tolerance_xy, "runs {:.6f} m backward, which the vehicle cannot")):
         amount, first, last = _worst_stretch(excess)
         if amount > tolerance:

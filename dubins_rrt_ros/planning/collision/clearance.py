@@ -2,8 +2,8 @@
 
 Guaranteed: along a curve that `curve_is_free` accepts the vehicle touches no obstacle anywhere, between samples too, and keeps a
 quarter of MARGIN from them; a curve along which it keeps MARGIN (a disc) or sqrt(2) of that (a polygon) is always accepted.
-`_kernels/clearance.py` and `_kernels/body.py` have the proofs. The distances are those to the squares of occupied cells, or to
-polygons, in double precision; nothing is rounded to cells.
+`_kernels/clearance.py` and `_kernels/collision.py` have the proofs. The distances are those to the squares of occupied
+cells, or to polygons, in double precision; nothing is rounded to cells.
 """
 
 import copy
@@ -15,10 +15,10 @@ import shapely
 from scipy import ndimage
 
 from .._kernels import COMPILED
-from .._kernels.body import Body, PolygonBody
 from .._kernels.clearance import GridClearance, PolygonClearance
-from .._kernels.distance import fill_columns, look_aside
-from .._kernels.field import free_squares
+from .._kernels.collision import CollisionChecker, PolygonChecker
+from .._kernels.cost_to_go import free_squares
+from .._kernels.distance import fill_columns, measure_row_gaps
 from ..curves.dubins import WORDS, DubinsCurve
 from ..maps.model import GridMap, Map, PolygonMap
 from ..problem import Pose
@@ -86,12 +86,12 @@ class ClearanceField:
             out[~shapely.contains_xy(self._polygons, points[..., 0], points[..., 1])] = 0
         return out
 
-    def body(self, vehicle: Vehicle) -> Body:
+    def body(self, vehicle: Vehicle) -> CollisionChecker:
         """The vehicle's body on the map, for one thread."""
         if not vehicle.outline:
-            return Body(self.kernel, vehicle.robot_radius)
+            return CollisionChecker(self.kernel, vehicle.robot_radius)
         found = cover(vehicle.outline)
-        return PolygonBody(self.kernel, vehicle.inner_radius, found.discs, found.corners, found.first_corner,
+        return PolygonChecker(self.kernel, vehicle.inner_radius, found.discs, found.corners, found.first_corner,
                            max(found.excess, 2 * MARGIN))
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
@@ -100,7 +100,7 @@ class ClearanceField:
         return bool(self.at(np.array(pose[:2])) > 0) and self.body(vehicle).is_free(*pose)
 
     def curve_is_free(self, curve: DubinsCurve, vehicle: Vehicle) -> bool:
-        """Whether the vehicle touches no obstacle along a curve; see `_kernels/clearance.py` and `_kernels/body.py`."""
+        """Whether the vehicle touches no obstacle along a curve; see `_kernels/clearance.py` and `_kernels/collision.py`."""
         # What starts in free space stays there, as no edge is crossed.
         if not self.at(np.array(curve.start[:2])) > 0:
             return False
@@ -167,21 +167,21 @@ def _grid_parts(grid: GridMap, allow_unknown: bool,
                 previous: "ClearanceField | None") -> tuple[GridClearance | PolygonClearance, Pose]:
     free, cell = ~grid.blocked(allow_unknown), grid.resolution
     if not COMPILED:
-        aside, field = _by_scipy(free, cell)
+        row_gap, field = _by_scipy(free, cell)
     elif (previous is not None and isinstance(previous.kernel, GridClearance)
           and (previous.kernel.field.shape, previous.kernel.resolution) == (free.shape, cell)):
-        aside, field = _changed(previous.kernel, free)
+        row_gap, field = _changed(previous.kernel, free)
     else:
-        aside, field = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
-        _fill(aside, field, free, cell, *(slice(0, n) for n in free.shape))
-    return GridClearance(field, cell, grid.origin, MARGIN, aside), grid.origin
+        row_gap, field = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
+        _fill(row_gap, field, free, cell, *(slice(0, n) for n in free.shape))
+    return GridClearance(field, cell, grid.origin, MARGIN, row_gap), grid.origin
 
 
-def _fill(aside: np.ndarray, field: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
-    """Compute `aside` in some rows, and with it the field in some columns."""
-    look_aside(free[rows].view(np.uint8), aside[rows])
-    farthest = min(int(aside[:, columns].max()) >> 2, (min(free.shape) + 1) // 2)
-    fill_columns(aside, columns.start, columns.stop, _bounds(farthest, cell), field)
+def _fill(row_gap: np.ndarray, field: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
+    """Compute `row_gap` in some rows, and with it the field in some columns."""
+    measure_row_gaps(free[rows].view(np.uint8), row_gap[rows])
+    farthest = min(int(row_gap[:, columns].max()) >> 2, (min(free.shape) + 1) // 2)
+    fill_columns(row_gap, columns.start, columns.stop, _bounds(farthest, cell), field)
 
 
 def _bounds(farthest: int, cell: float) -> np.ndarray:
@@ -194,16 +194,16 @@ def _bounds(farthest: int, cell: float) -> np.ndarray:
 
 
 def _changed(kernel: GridClearance, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`aside` and the field where other cells are free, computed afresh only where these matter."""
-    aside, field = np.asarray(kernel.aside), np.asarray(kernel.field)
-    changes = free != (aside != 0)
+    """`row_gap` and the field where other cells are free, computed afresh only where these matter."""
+    row_gap, field = np.asarray(kernel.row_gap), np.asarray(kernel.field)
+    changes = free != (row_gap != 0)
     if not changes.any():
-        return aside, field  # which nothing writes to
+        return row_gap, field  # which nothing writes to
     rows, columns = (slice(n[0], n[-1] + 1) for n in (np.flatnonzero(changes.any(axis=axis)) for axis in (1, 0)))
     reached = _reached(field, kernel.resolution, rows, columns)
-    aside, field = aside.copy(), field.copy()
-    _fill(aside, field, free, kernel.resolution, rows, reached)
-    return aside, field
+    row_gap, field = row_gap.copy(), field.copy()
+    _fill(row_gap, field, free, kernel.resolution, rows, reached)
+    return row_gap, field
 
 
 def _reached(field: np.ndarray, cell: float, rows: slice, columns: slice) -> slice:
@@ -230,14 +230,14 @@ def _reached(field: np.ndarray, cell: float, rows: slice, columns: slice) -> sli
 
 
 def _by_scipy(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """`aside` and the field, for where the kernels are interpreted: they would take minutes for a large map."""
+    """`row_gap` and the field, for where the kernels are interpreted: they would take minutes for a large map."""
     columns = free.shape[1]
     index = np.arange(columns, dtype=np.int32)
     left = index - np.maximum.accumulate(np.where(free, np.int32(-1), index), axis=1)
     right = np.minimum.accumulate(np.where(free, np.int32(columns), index)[:, ::-1], axis=1)[:, ::-1] - index
-    aside = 4 * np.minimum(left, right) + (left > right) + 2 * (right > left)
+    row_gap = 4 * np.minimum(left, right) + (left > right) + 2 * (right > left)
     squared = np.rint(ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]**2).astype(int)
-    return np.ascontiguousarray(aside, np.int32), _bounds(math.isqrt(squared.max()) + 1, cell)[squared]
+    return np.ascontiguousarray(row_gap, np.int32), _bounds(math.isqrt(squared.max()) + 1, cell)[squared]
 
 
 def _polygon_parts(polygons: PolygonMap) -> tuple[GridClearance | PolygonClearance, Pose]:

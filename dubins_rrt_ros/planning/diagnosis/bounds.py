@@ -8,7 +8,7 @@ import shapely
 from scipy import ndimage
 
 from .._kernels import COMPILED
-from .._kernels.widest import Flood
+from .._kernels.widest_path import WidestPathSearch
 from ..collision.clearance import MARGIN, ClearanceField
 from ..curves import dubins
 from ..maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap
@@ -118,9 +118,9 @@ def widest_way(problem: Problem, field: ClearanceField) -> Way | None:
         return None
     is_target = np.zeros(lattice.rows * lattice.columns, np.int8)
     is_target[targets] = 1
-    flood = Flood(field.kernel, lattice.first, lattice.along, (lattice.rows, lattice.columns), is_target, lattice.spacing / 2,
-                  problem.vehicle.inner_radius + MARGIN + lattice.spacing)
-    _, nodes = flood.widest_way(int(starts[np.argmax(field.at(lattice.points(starts)))]))
+    search = WidestPathSearch(field.kernel, lattice.first, lattice.along, (lattice.rows, lattice.columns), is_target,
+                              lattice.spacing / 2, problem.vehicle.inner_radius + MARGIN + lattice.spacing)
+    _, nodes = search.widest_path(int(starts[np.argmax(field.at(lattice.points(starts)))]))
     if len(nodes) == 0:
         return None
     points = lattice.points(nodes)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .._kernels.field import CostField
+from .._kernels.cost_to_go import CostToGoKernel
 from ..collision.clearance import ClearanceField
 from ..problem import Problem
 
@@ -15,7 +15,7 @@ FAR = 1e300
 class DistanceField:
     """The distances from a source around obstacles, for the vehicle's disc, as if it could turn on the spot.
 
-    After `make_bound` they are lower bounds, as `_kernels/field.py` proves; before, they can be too high by some hundredths.
+    After `make_bound` they are lower bounds, as `_kernels/cost_to_go.py` proves; before, they can be too high by some hundredths.
 
     They are about a hundredth below the shortest ways, and a little more where ways bend, since a square is taken as free where a
     point of it may be. On maps so large that a square is wider than the vehicle, thin walls may have holes.
@@ -30,7 +30,7 @@ class DistanceField:
         they are found as far as asked, and those on the way to `target` first, if there is one."""
         cells, squares = field.free_squares(need)
         self._field, self._free = field, squares
-        self.kernel = CostField(field.kernel, cells, squares, source, tolerance, target)
+        self.kernel = CostToGoKernel(field.kernel, cells, squares, source, tolerance, target)
 
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "DistanceField":

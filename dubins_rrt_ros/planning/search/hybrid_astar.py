@@ -16,7 +16,7 @@ from .smoothing import polished
 #: The runs up to the first path: the length of their arcs in turning radii, and the headings of their lattice; the weight of
 #: the cost-to-go is FIRST_WEIGHT; crowded poses count for more. The finer ones are for what the coarser ones do not get through.
 FIRST_RUNS = ((0.5, 16), (0.3, 24), (0.15, 32))
-FIRST_WEIGHT, FIRST_CROWDING = 2.0, 0.5
+FIRST_WEIGHT, FIRST_VISIT_PENALTY = 2.0, 0.5
 #: The next runs come closer and closer to the shortest path: the length of their arcs, the headings of their lattice, the weight.
 #: Later ones have arcs of random length, so that their lattices differ, and weigh the cost-to-go as it is.
 NEXT_RUNS = ((0.4, 16, 1.1), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
@@ -90,7 +90,7 @@ class HybridAStarRuns:
         problem, radius = self._problem, self._problem.vehicle.turning_radius
         corners = problem.map.corners()
         return HybridAStar(self._body, radius, problem.start, self._goals, self._to_goal.kernel, corners.min(axis=0),
-                           np.ptp(corners, axis=0), arc * radius, sectors, weight, FIRST_CROWDING if best is None else 0.0,
+                           np.ptp(corners, axis=0), arc * radius, sectors, weight, FIRST_VISIT_PENALTY if best is None else 0.0,
                            1e300 if best is None else SLACK * best, MOST_EXPANDED)
 
     def _measures(self, first: bool) -> tuple[float, int, float]:

@@ -32,7 +32,7 @@ from functools import cached_property
 import numpy as np
 
 from .._kernels import COMPILED
-from .._kernels.grow import Grower
+from .._kernels.rrt import RrtKernel
 from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
 from ..curves.chain import Chain
@@ -77,7 +77,7 @@ class Search:
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
         self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
-        self._grower = Grower(self._tree, field.body(vehicle), settings.step_size, NEAR_FACTOR, MOST_NEAR,
+        self._grower = RrtKernel(self._tree, field.body(vehicle), settings.step_size, NEAR_FACTOR, MOST_NEAR,
                               problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
         self._problem, self._settings, self._field, self._to_goal = problem, settings, field, to_goal
@@ -224,7 +224,7 @@ class Search:
 
     def _end_block(self) -> None:
         """Take what was computed beside the last block, and begin what is due after it."""
-        self._tree.spread()
+        self._tree.rehash()
         self._look_for_best()
         if self._runs:
             self._take_portion()
@@ -245,7 +245,7 @@ class Search:
         """Add a path to the tree; `end` is the node at its end, if the tree has it."""
         if end < 0 and self.best >= 0 and self._problem.exact_goal:
             end = self.best
-        self._grower.adopt(*chain.cut(self._tree.radius, self._settings.step_size), end)
+        self._grower.insert_path(*chain.cut(self._tree.radius, self._settings.step_size), end)
         self._look_for_best()
 
     def _look_for_best(self) -> None:
@@ -264,13 +264,13 @@ class Search:
             self._from_start = self._bound_from_start()  # first, as it was begun last and may not have been begun yet
             self.make_bound()
         limit = self.length
-        self._grower.beat(limit, self._from_start.kernel, self._to_goal.kernel)
+        self._grower.set_cost_bound(limit, self._from_start.kernel, self._to_goal.kernel)
         if limit < self._forgot_above * (1 - LEAST_FALL):
             self._forgot_above = limit
             places = np.asarray(self._tree.poses)[:self.size, :2]
             wanted = self._from_start.at(places) + self._to_goal.at(places) < limit
             wanted[[0, self.best]] = True
-            self._tree.index_only(wanted.astype(np.int8))
+            self._tree.prune_index(wanted.astype(np.int8))
 
     def _polished(self, chain: Chain, fresh: bool) -> Chain:
         return polished(chain, self._problem.vehicle, self._field, self._rng, fresh)

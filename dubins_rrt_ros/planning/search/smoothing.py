@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .._kernels.polish import Polisher
+from .._kernels.shortcut import Shortcutter
 from ..collision.clearance import ClearanceField
 from ..curves.chain import Chain
 from ..vehicle import Vehicle
@@ -21,7 +21,7 @@ def polished(chain: Chain, vehicle: Vehicle, field: ClearanceField, rng: np.rand
         fresh: whether it was not polished before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    polisher = Polisher(field.body(vehicle), vehicle.turning_radius, *chain, TRIES)
-    polisher.polish(draws, FRESH if fresh else KNOWN)
+    polisher = Shortcutter(field.body(vehicle), vehicle.turning_radius, *chain, TRIES)
+    polisher.improve(draws, FRESH if fresh else KNOWN)
     arrays = (np.array(view[:polisher.count]) for view in (polisher.poses, polisher.words, polisher.lengths))
     return Chain(*arrays)

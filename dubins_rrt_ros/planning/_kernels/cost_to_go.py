@@ -27,8 +27,8 @@ else:
 ROUNDING = cython.declare(cython.double, 1e-9)
 
 
-def free_squares(clearance: Clearance, block: cython.int, need: cython.double):
-    """Which squares of `block` x `block` cells may hold a point with the clearance `need` [m]: all others hold none.
+def free_squares(clearance: Clearance, block: cython.int, required_clearance: cython.double):
+    """Find the squares of `block` x `block` cells that may hold a point with the required clearance [m].
 
     Returns:
         (rows + 3, columns + 3) int8 for rows x columns squares, in a border of zeros: one before them and two behind.
@@ -42,7 +42,7 @@ def free_squares(clearance: Clearance, block: cython.int, need: cython.double):
     with cython.nogil:
         for row in range(rows):
             for column in range(columns):
-                if not free[row // block + 1, column // block + 1] and may_be_free(clearance, row, column, need):
+                if not free[row // block + 1, column // block + 1] and may_be_free(clearance, row, column, required_clearance):
                     free[row // block + 1, column // block + 1] = 1
     return found
 
@@ -50,13 +50,13 @@ def free_squares(clearance: Clearance, block: cython.int, need: cython.double):
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
-def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, need: cython.double) -> cython.bint:
+def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, required_clearance: cython.double) -> cython.bint:
     """Whether a cell has a quarter whose centre is at most half a diagonal of it short of the clearance."""
     side: cython.double = clearance.resolution
     bound: cython.double = cython.cast(cython.double, clearance.field[row, column])
-    if bound < 0 or bound >= need:
+    if bound < 0 or bound >= required_clearance:
         return bound >= 0
-    enough: cython.double = need - side * (sqrt(0.125) + ROUNDING)
+    enough: cython.double = required_clearance - side * (sqrt(0.125) + ROUNDING)
     quarter: cython.int
     for quarter in range(4):
         if clearance.exact((column + 0.25 + 0.5 * (quarter & 1)) * side, (row + 0.25 + 0.5 * (quarter >> 1)) * side) >= enough:
@@ -65,7 +65,7 @@ def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, need:
 
 
 @cython.cclass
-class CostField:
+class CostToGoKernel:
     """The costs of the nodes. Square `row * width + column` has the nodes of this number, of the next, and of those a row on.
 
     Attributes:
@@ -87,12 +87,12 @@ class CostField:
         self.squares, self.shape, self.width, self.size = free, free.shape, free.shape[1], free.size
         self.tolerance, self.deduction, self.is_bound, self.flat = tolerance / self.side, 0, False, None
         self.column, self.row = self.place(source[0], source[1])
-        self.take(self.begun(target))
+        self.use(self.started_equation(target))
 
     def prepare_bound(self):
         """Do the long part of `make_bound`, which leaves the costs as they are."""
         if self.flat is None:
-            flat: Eikonal = self.begun(None)
+            flat: Eikonal = self.started_equation(None)
             flat.flatten()
             self.flat = flat
 
@@ -101,12 +101,12 @@ class CostField:
         if self.is_bound:
             return
         self.prepare_bound()
-        self.take(self.flat)
+        self.use(self.flat)
         self.is_bound = True
         # At a point of the source the nodes around it have no more than their distances to it: sqrt(1 / 2) between them.
         self.deduction = sqrt(0.5) if self.tolerance > 0 else self.squares_to(self.column, self.row)
 
-    def begun(self, target):
+    def started_equation(self, target):
         """The equation, begun at the source."""
         equation: Eikonal = Eikonal(self.squares)
         if target is not None:
@@ -114,7 +114,7 @@ class CostField:
         equation.begin(self.column, self.row, self.tolerance)
         return equation
 
-    def take(self, equation: Eikonal):
+    def use(self, equation: Eikonal):
         """Let the costs be those of an equation."""
         self.equation, self.free, self.cost = equation, equation.free, equation.cost
 
@@ -162,7 +162,7 @@ class CostField:
         square: cython.int = self.square_at(column, row)
         if square < 0 or not self.free[square]:
             return FAR
-        self.equation.settle(square)
+        self.equation.ensure_final(square)
         if self.cost[square] >= FAR:
             return FAR
         return self.within(square, column - square % self.width, row - square // self.width)

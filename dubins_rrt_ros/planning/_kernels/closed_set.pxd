@@ -1,6 +1,6 @@
 cdef float UNSEEN
 
-cdef class Lattice:
+cdef class ClosedSet:
     cdef int used
     cdef int bits
     cdef int sectors

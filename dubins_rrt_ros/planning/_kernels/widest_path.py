@@ -25,7 +25,7 @@ START = cython.declare(cython.schar, 5)
 
 
 @cython.cclass
-class Flood:
+class WidestPathSearch:
     """A flood over a lattice; node `row * columns + column` lies `column` steps along and `row` steps across from the first."""
 
     clearance: Clearance
@@ -63,13 +63,13 @@ class Flood:
         self.queue, self.heap = np.empty(nodes, np.int32), Heap(nodes)
         self.queued = 0
 
-    def widest_way(self, start: cython.int):
+    def widest_path(self, start: cython.int):
         """The least clearance on the widest way [m], at most `enough`, and the way's nodes as (n,) int32; 0 and none
         where no target can be reached."""
         target: cython.int
         with cython.nogil:
             target = self.flood(start)
-        return (self.level, self.way_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
+        return (self.level, self.nodes_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
 
     @cython.cfunc
     @cython.nogil
@@ -122,7 +122,7 @@ class Flood:
         else:
             self.heap.push(node, -found)
 
-    def way_to(self, node: cython.int):
+    def nodes_to(self, node: cython.int):
         """(n,) int32: the nodes by which `node` was reached, from the start on."""
         way = [node]
         while self.entered[node] != START:

@@ -21,14 +21,14 @@ UNSEEN = cython.declare(cython.float, 0)
 #: How many entries there are at first is two to the power of this; never are more than half of them in use.
 FIRST_BITS = 10
 #: 2^64 by the golden ratio, which spreads neighbouring cells (D. Knuth, The art of computer programming, volume 3, 6.4).
-SPREAD = cython.declare(cython.ulonglong, 0x9E3779B97F4A7C15)
+GOLDEN_RATIO_64 = cython.declare(cython.ulonglong, 0x9E3779B97F4A7C15)
 #: The bits of a cell's number that tell it apart: where there are more cells than 2^63, some share an entry.
 TOLD_APART = cython.declare(cython.ulonglong, 0x7FFFFFFFFFFFFFFF)
 BITS_OF_WORD = cython.declare(cython.ulonglong, 0xFFFFFFFFFFFFFFFF)
 
 
 @cython.cclass
-class Lattice:
+class ClosedSet:
     """The cells that were asked for, each with an entry of the table; `costs` has their costs by entry."""
 
     def __init__(self, corner, extent, side, sectors):
@@ -81,7 +81,7 @@ class Lattice:
     def entry_of(self, cell: cython.longlong) -> cython.int:
         """The entry of a cell by its number."""
         number: cython.ulonglong = cython.cast(cython.ulonglong, cell)
-        entry: cython.int = cython.cast(cython.int, (number * SPREAD & BITS_OF_WORD) >> (64 - self.bits))
+        entry: cython.int = cython.cast(cython.int, (number * GOLDEN_RATIO_64 & BITS_OF_WORD) >> (64 - self.bits))
         while self.cells[entry] != cell:
             if self.cells[entry] == NO_CELL:
                 self.cells[entry], self.costs[entry] = cell, UNSEEN

@@ -10,7 +10,7 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
+    from cython.cimports.dubins_rrt_ros.planning._kernels.collision import CollisionChecker
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
         NO_CURVE,
         TWO_PI,
@@ -23,7 +23,7 @@ if cython.compiled:
 else:
     from math import cos, exp, log, remainder, sin
 
-    from .body import Body
+    from .collision import CollisionChecker
     from .dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within, turn_of
 
 #: A smaller gain is rounding [m].
@@ -41,7 +41,7 @@ MOST_NEW = 3
 
 
 @cython.cclass
-class Polisher:
+class Shortcutter:
     """A path as a chain of poses, each reached by a curve from the one before.
 
     Attributes:
@@ -51,7 +51,7 @@ class Polisher:
         ends: (n,): how far along the path the poses are [m].
     """
 
-    body: Body
+    body: CollisionChecker
     radius: cython.double
     count = cython.declare(cython.int, visibility="readonly")
     poses = cython.declare(cython.double[:, ::1], visibility="readonly")
@@ -72,7 +72,7 @@ class Polisher:
     new_words: cython.schar[::1]
     new_lengths: cython.double[:, ::1]
 
-    def __init__(self, body: Body, radius: cython.double, poses, words, lengths, tries):
+    def __init__(self, body: CollisionChecker, radius: cython.double, poses, words, lengths, tries):
         """
         Args:
             body: what is free along the path, and must be along each curve that is put in.
@@ -91,7 +91,7 @@ class Polisher:
         self.new_words = np.empty(MOST_NEW, np.int8)
         self.measure_from(1)
 
-    def polish(self, draws: cython.double[:, ::1], shortcuts: cython.double):
+    def improve(self, draws: cython.double[:, ::1], shortcuts: cython.double):
         """Try a change for each row of (n, 6) draws: four uniform in [0, 1), two normal; the share `shortcuts` are such."""
         i: cython.int
         with cython.nogil:
@@ -110,15 +110,15 @@ class Polisher:
         """Try a shortcut or a detour; the draws say where, how far back and ahead, and by how much beside the path."""
         total: cython.double = self.ends[self.count - 1]
         least: cython.double = LEAST_SPAN * self.radius
-        spread: cython.double = log(max(total / least, 2.0))
+        largest_span: cython.double = log(max(total / least, 2.0))
         pose: cython.int
         if not direct and self.count > 2 and where < MOVES:
             pose = 1 + cython.cast(cython.int, where / MOVES * (self.count - 2))
             self.try_detour(self.ends[pose - 1], self.ends[pose], self.ends[pose + 1], back, across, turn)
             return
         middle: cython.double = where * total
-        begin: cython.double = max(0.0, middle - least * exp(back * spread))
-        end: cython.double = min(total, middle + least * exp(ahead * spread))
+        begin: cython.double = max(0.0, middle - least * exp(back * largest_span))
+        end: cython.double = min(total, middle + least * exp(ahead * largest_span))
         if direct:
             self.try_shortcut(begin, end)
         else:

@@ -33,22 +33,22 @@ NARROWER = cython.declare(cython.double, 0.25)
 
 
 @cython.cclass
-class Body:
+class CollisionChecker:
     """A disc around the reference point.
 
     Attributes:
-        need: its radius; for other bodies, that of the largest disc around the reference point that they cover [m].
+        required_clearance: its radius; for other bodies, that of the largest disc around the reference point that they cover [m].
     """
 
-    def __init__(self, clearance: Clearance, need: cython.double):
-        self.clearance, self.need = clearance, need
+    def __init__(self, clearance: Clearance, required_clearance: cython.double):
+        self.clearance, self.required_clearance = clearance, required_clearance
 
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
     def free(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.bint:
         """Whether the body keeps the margin at a pose."""
-        return self.clearance.free(x, y, self.need)
+        return self.clearance.free(x, y, self.required_clearance)
 
     @cython.cfunc
     @cython.nogil
@@ -56,7 +56,7 @@ class Body:
     def curve_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
                       first: cython.double, second: cython.double, third: cython.double) -> cython.bint:
         """Whether the body is free all along a curve; see the module's guarantee."""
-        return self.clearance.curve_is_free(x, y, theta, radius, word, first, second, third, self.need)
+        return self.clearance.curve_is_free(x, y, theta, radius, word, first, second, third, self.required_clearance)
 
     def is_free(self, x: cython.double, y: cython.double, theta: cython.double) -> bool:
         """Whether the body keeps the margin at a pose."""
@@ -69,20 +69,20 @@ class Body:
 
 
 @cython.cclass
-class PolygonBody(Body):
+class PolygonChecker(CollisionChecker):
     """A polygon, as `footprint.py` prepares it. It has room of its own to work in: no two threads may share one."""
 
-    def __init__(self, clearance: Clearance, need, discs, corners, first_corner, worth):
+    def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, worth):
         """
         Args:
-            need: the radius of the largest disc around the reference point that the polygon covers [m].
+            required_clearance: the radius of the largest disc around the reference point that the polygon covers [m].
             discs: (m, 4): the discs that cover it: x, y, radius, and the radius of a disc there that it covers [m].
             corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and how far they move, per metre that the
                 part is made wider by.
             first_corner: (p + 1,) int32: where each part's corners begin.
             worth: where the discs give at least this gap, they are exact enough [m].
         """
-        Body.__init__(self, clearance, need)
+        CollisionChecker.__init__(self, clearance, required_clearance)
         self.discs, self.corners, self.first_corner, self.worth = discs, corners, first_corner, worth
         self.placed = np.empty((len(corners), 2))
         self.spans = np.empty((clearance.field.shape[0], 2))

@@ -8,22 +8,22 @@ motion planning (2011), have: the parent of a new node is chosen among its near 
 import cython
 import numpy as np
 
-from .arrays import grown
+from .arrays import resized
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.body import Body
+    from cython.cimports.dubins_rrt_ros.planning._kernels.collision import CollisionChecker
+    from cython.cimports.dubins_rrt_ros.planning._kernels.cost_to_go import CostToGoKernel
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, shortest, turn_of
-    from cython.cimports.dubins_rrt_ros.planning._kernels.field import CostField
-    from cython.cimports.dubins_rrt_ros.planning._kernels.near import GainSet, NearSet
+    from cython.cimports.dubins_rrt_ros.planning._kernels.near import BackwardNeighbors, ForwardNeighbors
     from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
     from cython.cimports.libc.math import ceil, fabs, log, remainder
 else:
     from math import ceil, fabs, log, remainder
 
-    from .body import Body
+    from .collision import CollisionChecker
+    from .cost_to_go import CostToGoKernel
     from .dubins import TWO_PI, drive, shortest, turn_of
-    from .field import CostField
-    from .near import GainSet, NearSet
+    from .near import BackwardNeighbors, ForwardNeighbors
     from .tree import SearchTree
 
 #: A smaller gain is rounding, and no reason to rewire [m].
@@ -37,7 +37,7 @@ ROUNDING = cython.declare(cython.double, 1e-9)
 
 
 @cython.cclass
-class Grower:
+class RrtKernel:
     """Adds samples to a tree.
 
     Attributes:
@@ -45,7 +45,7 @@ class Grower:
     """
 
     tree: SearchTree
-    body: Body
+    body: CollisionChecker
     step: cython.double
     longest: cython.double
     near_factor: cython.double
@@ -54,18 +54,18 @@ class Grower:
     goal_theta: cython.double
     tolerance_xy: cython.double
     tolerance_yaw: cython.double
-    closest: NearSet
-    to: NearSet
-    onward: GainSet
+    closest: BackwardNeighbors
+    to: BackwardNeighbors
+    onward: ForwardNeighbors
     bounded: cython.bint
     tried: cython.int
     limit: cython.double
-    from_start: CostField
-    to_goal: CostField
+    from_start: CostToGoKernel
+    to_goal: CostToGoKernel
     goal_nodes: cython.int[::1]
     goal_count = cython.declare(cython.int, visibility="readonly")
 
-    def __init__(self, tree: SearchTree, body: Body, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
+    def __init__(self, tree: SearchTree, body: CollisionChecker, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
         """
         Args:
             body: what must be free along every edge.
@@ -78,21 +78,22 @@ class Grower:
         self.longest = step * (1 + ROUNDING) if step > 0 else NO_WAY
         self.goal_x, self.goal_y, self.goal_theta = goal
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
-        self.closest = NearSet(tree, 1)
-        self.to = NearSet(tree, most_near)
-        self.onward = GainSet(tree, most_near)
+        self.closest = BackwardNeighbors(tree, 1)
+        self.to = BackwardNeighbors(tree, most_near)
+        self.onward = ForwardNeighbors(tree, most_near)
         self.goal_nodes = np.empty(0, np.int32)
         self.goal_count = 0
         self.bounded = False
         self.tried = 0
         self.limit = NO_WAY
 
-    def beat(self, limit: cython.double, from_start: CostField, to_goal: CostField):
+    def set_cost_bound(self, limit: cython.double, from_start: CostToGoKernel, to_goal: CostToGoKernel):
         """From now on add and attach only what can be on a path shorter than `limit` [m], by distances that none falls below."""
         self.bounded = True
         self.limit, self.from_start, self.to_goal = limit, from_start, to_goal
 
-    def adopt(self, poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], end: cython.int):
+    def insert_path(self, poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1],
+                    end: cython.int):
         """Add a path from the root, and rewire the nodes near it.
 
         Args:
@@ -111,7 +112,7 @@ class Grower:
                                     lengths[i, 0], lengths[i, 1], lengths[i, 2])
                     if has_others:
                         self.to.collect_nearest(poses[i, 0], poses[i, 1], poses[i, 2], self.near_count(), self.longest)
-                        self.rewire(node, self.to.reach)
+                        self.rewire(node, self.to.neighbor_radius)
                 elif self.tree.costs[node] + (lengths[i, 0] + lengths[i, 1] + lengths[i, 2]) < self.tree.costs[end]:
                     self.tree.reparent(end, node, words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
 
@@ -119,7 +120,7 @@ class Grower:
         """Make room for `more` nodes, so that adding them allocates nothing."""
         self.tree.reserve(more)
         if self.goal_count + more > self.goal_nodes.shape[0]:
-            self.goal_nodes = grown(self.goal_nodes, 2 * (self.goal_count + more))
+            self.goal_nodes = resized(self.goal_nodes, 2 * (self.goal_count + more))
 
     def best_goal_node(self) -> int:
         """The cheapest node that reaches the goal, or -1."""
@@ -202,10 +203,10 @@ class Grower:
             node = self.to.nodes[0]
             self.choose_parent(x, y, theta, node, self.tree.costs[node] - LEAST_GAIN)
             return
-        reach: cython.double = self.to.reach
+        neighbor_radius: cython.double = self.to.neighbor_radius
         node = self.choose_parent(x, y, theta, -1, limit)
         if node >= 0:
-            self.rewire(node, reach)
+            self.rewire(node, neighbor_radius)
 
     @cython.cfunc
     @cython.nogil
@@ -302,11 +303,11 @@ class Grower:
     @cython.cfunc
     @cython.nogil
     @cython.exceptval(check=False)
-    def rewire(self, node: cython.int, reach: cython.double) -> cython.void:
+    def rewire(self, node: cython.int, neighbor_radius: cython.double) -> cython.void:
         """Reroute through `node` each near node that is cheaper so, and free. Its ancestors cannot be cheaper."""
         i: cython.int
         near: cython.int
-        self.onward.collect_gaining(node, reach, LEAST_GAIN)
+        self.onward.collect_cheaper(node, neighbor_radius, LEAST_GAIN)
         for i in range(self.onward.count):
             near = self.onward.nodes[i]
             if (self.tree.costs[node] + self.onward.keys[i] < self.tree.costs[near] - LEAST_GAIN

@@ -1,13 +1,13 @@
 from dubins_rrt_ros.planning._kernels.clearance cimport Clearance
 
-cdef class Body:
+cdef class CollisionChecker:
     cdef Clearance clearance
-    cdef readonly double need
+    cdef readonly double required_clearance
     cdef bint free(self, double x, double y, double theta) noexcept nogil
     cdef bint curve_is_free(self, double x, double y, double theta, double radius, int word,
                             double first, double second, double third) noexcept nogil
 
-cdef class PolygonBody(Body):
+cdef class PolygonChecker(CollisionChecker):
     cdef double[:, ::1] discs
     cdef double[:, ::1] corners
     cdef int[::1] first_corner

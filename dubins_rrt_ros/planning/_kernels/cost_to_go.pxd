@@ -1,7 +1,7 @@
 from dubins_rrt_ros.planning._kernels.clearance cimport Clearance
 from dubins_rrt_ros.planning._kernels.eikonal cimport Eikonal
 
-cdef class CostField:
+cdef class CostToGoKernel:
     cdef readonly tuple shape
     cdef readonly double side
     cdef Clearance clearance
