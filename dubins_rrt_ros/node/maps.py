@@ -51,7 +51,7 @@ class Preparation:
     """What plan() needs of a map, for one vehicle.
 
     Attributes:
-        map, inner_radius, allow_unknown: what it is for.
+        map, inscribed_radius, allow_unknown: what it is for.
         previous: a world that was prepared before, from which what did not change is taken over; None once this one is there, so
             that it is not kept alive any longer.
         world: what is prepared; cancelled where that was not needed any more.
@@ -59,7 +59,7 @@ class Preparation:
     """
 
     map: Map
-    inner_radius: float
+    inscribed_radius: float
     allow_unknown: bool
     previous: World | None
     world: "futures.Future[World]" = field(default_factory=futures.Future)
@@ -123,9 +123,9 @@ class Maps:
     def prepared(self) -> Preparation:
         """The preparation of the current map for the present vehicle, begun if it was not."""
         now = self._parameters.read()
-        wanted = self.current.map, now.vehicle.inner_radius, now.problem["allow_unknown"]
+        wanted = self.current.map, now.vehicle.inscribed_radius, now.problem["allow_unknown"]
         last = self._preparation
-        if last is None or (last.map, last.inner_radius, last.allow_unknown) != wanted:
+        if last is None or (last.map, last.inscribed_radius, last.allow_unknown) != wanted:
             self._preparation = Preparation(*wanted, _prepared_before(last))
             self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
         return self._preparation
@@ -188,7 +188,7 @@ class Maps:
         if isinstance(outcome, Exception):
             raise outcome
         if outcome is self._preparation:
-            outline = self._parameters.read().vehicle.outline
+            outline = self._parameters.read().vehicle.footprint
             vehicle = f", for {summary(outline)}" if outline else ""
             self._node.get_logger().info(f"The map is ready, id {outcome.map.id}{vehicle}")
             self._tell_prepared()

@@ -36,8 +36,8 @@ def tree_markers(plan: Plan | None, frame: str, stamp: Time, most: int) -> Marke
         markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius, most), width, TREE_COLOR)
         markers.append(_arrow(header, "start", plan.problem.start, radius, START_COLOR))
         markers.append(_arrow(header, "goal", plan.problem.goal, radius, GOAL_COLOR))
-        if plan.culprit is not None:
-            markers.append(_disc(header, "culprit", plan.culprit, 0.3 * radius, CULPRIT_COLOR))
+        if plan.location is not None:
+            markers.append(_disc(header, "culprit", plan.location, 0.3 * radius, CULPRIT_COLOR))
         if plan.path is not None:
             poses = plan.path.poses(CHORD * radius)
             markers += _lines(header, "path", Marker.LINE_STRIP, poses[:, :2], 3 * width, PATH_COLOR)

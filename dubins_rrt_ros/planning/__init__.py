@@ -1,6 +1,16 @@
-"""Dubins RRT and RRT* without ROS.
+"""Plan shortest paths of a car that cannot turn on the spot, by RRT and RRT* on Dubins curves, without ROS.
 
-One verb: plan(problem, settings) -> Plan.
+    >>> from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan
+    >>> problem = Problem(load_map("maps/maze.yaml"), Vehicle(turning_radius=1.0, robot_radius=0.2),
+    ...                   start=(1.5, 2.0, 1.57), goal=(13.5, 10.5, 1.57))
+    >>> result = plan(problem, Settings(seed=1))
+    >>> result.solved, round(result.path.length, 1), result.path.poses(spacing=0.05).shape[1]
+    (True, 20.0, 3)
+
+One verb, `plan(problem, settings)`, and its nouns: a `Problem` has a map (`load_map`, `GridMap`, `PolygonMap`), a `Vehicle`, a
+start and a goal; a `Plan` has an audited `Path` of Dubins curves, or a `Status` and a message that say why there is none, and the
+search `Tree`. `prepare` does once for many problems what depends on map and vehicle alone. Lengths are in metres, angles in
+radians, times in seconds. Errors that are raised on purpose derive from `PlanningError`.
 """
 
 from ._kernels import COMPILED as kernels_compiled
@@ -8,6 +18,7 @@ from .audit import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .curves.dubins import WORDS, CurveError, DubinsCurve
 from .curves.path import Path, PathError
+from .errors import PlanningError
 from .maps.files import load_map, save_map
 from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
 from .option import OptionError, options, values
@@ -19,9 +30,16 @@ from .settings import Settings
 from .vehicle import Vehicle
 from .world import World, prepare
 
-__all__ = [
-    "FREE", "OCCUPIED", "UNKNOWN", "WORDS", "Audit", "ClearanceField", "CurveError", "DubinsCurve", "GridMap", "InvalidPose",
-    "Map", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "Path", "PathError", "Plan", "PlanError",
-    "PolygonMap", "Pose", "Problem", "Progress", "Settings", "Status", "Tree", "TreeError", "Vehicle", "World", "audit_path",
-    "checked_pose", "kernels_compiled", "load_map", "options", "plan", "prepare", "rasterise", "save_map", "values",
+__all__ = [  # noqa: RUF022 - by what a user needs, in this order
+    # what to plan, and how
+    "plan", "prepare", "Problem", "Settings", "Vehicle", "World", "load_map",
+    # what comes of it
+    "Plan", "Progress", "Status", "Path", "DubinsCurve", "Tree", "Audit", "audit_path",
+    # maps
+    "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "rasterise", "save_map",
+    # errors
+    "PlanningError", "CurveError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "PathError",
+    "PlanError", "TreeError",
+    # the rest
+    "WORDS", "ClearanceField", "Pose", "checked_pose", "kernels_compiled", "options", "values",
 ]

@@ -5,17 +5,44 @@ The command line's flags, the node's parameters and the documentation are derive
 
 import dataclasses
 import sys
-from typing import Any, NamedTuple
+import textwrap
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
+from .errors import PlanningError
 from .text import quoted
 
+_Class = TypeVar("_Class", bound=type)
 
-class OptionError(ValueError):
+
+class OptionError(PlanningError, ValueError):
     """A value that an option does not take; the message names option, value and remedy."""
 
 
+class TextForm(NamedTuple):
+    """How an option whose values are structured is written in files, flags and parameters.
+
+    Attributes:
+        read: takes a text or a value and returns the value, or raises OptionError.
+        write: returns the text of a value.
+    """
+
+    read: Callable[[Any], Any]
+    write: Callable[[Any], str]
+
+
 class Option(NamedTuple):
-    """What is known of one option."""
+    """An option of a dataclass.
+
+    Attributes:
+        name: the name of the field.
+        type, default: as in files, flags and parameters; `text_form` tells where a field holds something else.
+        unit: in brackets after the help; "" for none.
+        low, high: the range of a number, both included.
+        choices: the texts that are allowed; () for any.
+        help: a phrase without a full stop.
+        text_form: of a field that holds more than a text, or None.
+    """
 
     name: str
     type: type
@@ -25,13 +52,14 @@ class Option(NamedTuple):
     high: float | None
     choices: tuple[str, ...]
     help: str
+    text_form: TextForm | None
 
     def describe(self) -> str:
-        """The help with the unit and what is allowed, on one line."""
+        """Return the help with the unit and what is allowed, on one line."""
         return self.help + (f" [{self.unit}]" if self.unit else "") + f" ({self.allowed()})"
 
     def allowed(self) -> str:
-        """What the option takes, in words."""
+        """Return what the option takes, in words."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
         if self.type is bool:
@@ -43,32 +71,51 @@ class Option(NamedTuple):
         return f"a number from {self.low:g} to {self.high:g}"
 
     def convert(self, value: Any) -> Any:
-        """`value` as the option's type, an int where a float is due included.
+        """Return `value` as the field holds it; an int is taken where a float is due.
 
         Raises:
             OptionError: the value is of another type, not finite or out of range.
         """
-        fits = type(value) is self.type or (self.type, type(value)) == (float, int)
-        if fits and self.type in (int, float):
-            fits = self.low <= value <= self.high  # which is exact for an integer that no float can hold, and false for NaN
-        if fits and self.choices:
-            fits = value in self.choices
-        if not fits:
+        if self.text_form:
+            return self.text_form.read(value)
+        if not self._takes(value):
             raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}")
         return float(value) if self.type is float else value
 
+    def _takes(self, value: Any) -> bool:
+        if not (type(value) is self.type or (self.type, type(value)) == (float, int)):
+            return False
+        if self.low is not None and self.high is not None:
+            return self.low <= value <= self.high  # which is exact for an integer that no float can hold, and false for NaN
+        return not self.choices or value in self.choices
+
 
 def option(default: Any, help: str, *, unit: str = "", low: float | None = None, high: float | None = None,
-           choices: tuple[str, ...] = ()) -> Any:
-    """A dataclass field that is an option."""
-    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": help}
+           choices: tuple[str, ...] = (), text_form: TextForm | None = None) -> Any:
+    """Return a dataclass field that is an option."""
+    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": help, "text_form": text_form}
     return dataclasses.field(default=default, metadata=metadata)
 
 
 def options(cls: type) -> tuple[Option, ...]:
-    """The options among the fields of a dataclass, in order."""
-    return tuple(Option(name=f.name, type=type(f.default), default=f.default, **f.metadata)
-                 for f in dataclasses.fields(cls) if f.metadata)
+    """Return the options among the fields of a dataclass, in order."""
+    return tuple(_option_of(field) for field in dataclasses.fields(cls) if field.metadata)
+
+
+def _option_of(field: "dataclasses.Field[Any]") -> Option:
+    form = field.metadata["text_form"]
+    default = form.write(field.default) if form else field.default
+    return Option(name=field.name, type=type(default), default=default, **field.metadata)
+
+
+def documented(cls: _Class) -> _Class:
+    """Add the options of a dataclass, with default, unit and range, to its docstring."""
+    defaults = {field.name: field.default for field in dataclasses.fields(cls)}
+    lines = [f"{item.name} ({type(defaults[item.name]).__name__}, default {defaults[item.name]!r}): {item.describe()}"
+             for item in options(cls)]
+    entries = (textwrap.fill(line, 110, initial_indent=" " * 8, subsequent_indent=" " * 12) for line in lines)
+    cls.__doc__ = "\n".join([(cls.__doc__ or "").rstrip(), "", "    Options:", *entries, "    "])
+    return cls
 
 
 def convert_options(instance: Any) -> None:
@@ -78,10 +125,14 @@ def convert_options(instance: Any) -> None:
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a finite float, or an integer that a float can hold; true and false are none."""
+    """Return True for a finite float, and for an integer that a float can hold; true and false are no numbers."""
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 def values(instance: Any) -> dict[str, Any]:
-    """The options of a dataclass' instance by name."""
-    return {item.name: getattr(instance, item.name) for item in options(type(instance))}
+    """Return the options of a dataclass' instance by name, as in files, flags and parameters."""
+    return {item.name: _plain(item, getattr(instance, item.name)) for item in options(type(instance))}
+
+
+def _plain(item: Option, value: Any) -> Any:
+    return item.text_form.write(value) if item.text_form else value

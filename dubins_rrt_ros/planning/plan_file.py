@@ -8,6 +8,7 @@ from dubins_rrt_ros import __version__
 
 from .curves.dubins import WORDS, DubinsCurve
 from .curves.path import Path
+from .errors import PlanningError
 from .maps.model import Map
 from .option import is_number, options, values
 from .problem import Problem, checked_pose
@@ -17,7 +18,7 @@ from .text import one_line, quoted
 from .vehicle import Vehicle
 
 
-class PlanFileError(ValueError):
+class PlanFileError(PlanningError, ValueError):
     """A document that holds no plan; the message, one line, says what is wrong with it."""
 
     def __init__(self, message: str):
@@ -38,7 +39,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "time_to_first": _number(plan.time_to_first), "planning_time": _number(plan.planning_time),
         "map_time": _number(plan.map_time), "length": _number(plan.length), "lower_bound": _number(plan.lower_bound),
         "gap": _number(plan.gap), "min_clearance": _number(plan.min_clearance),
-        "max_curvature": _number(plan.max_curvature), "audit": plan.audit,
+        "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
         "poses": path.poses(settings.path_spacing).tolist() if path else [],
         "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
+from .errors import PlanningError
 from .maps.model import Map
-from .option import OptionError, convert_options, option
+from .option import OptionError, convert_options, documented, option
 from .text import quoted
 from .vehicle import Vehicle
 
@@ -17,7 +18,7 @@ Pose = tuple[float, float, float]
 LARGEST_YAW = 1e6
 
 
-class InvalidPose(ValueError):
+class InvalidPose(PlanningError, ValueError):
     """A pose that is none; the message says which and why."""
 
 
@@ -34,6 +35,7 @@ class PreparedMap(Protocol):
     def allow_unknown(self) -> bool: ...
 
 
+@documented
 @dataclass(frozen=True, eq=False, init=False)
 class Problem:
     """One request to the planner: `Problem(map, vehicle, start, goal)`, or `Problem(world, start=..., goal=...)`.
@@ -53,13 +55,13 @@ class Problem:
     vehicle: Vehicle
     start: Pose
     goal: Pose
-    goal_tolerance_xy: float = option(0.0, "how far from the goal the path may end; 0 is exactly there", unit="m",
-                                      low=0.0, high=1e6)
-    goal_tolerance_yaw: float = option(0.0, "how far from the goal's heading the path may end; 0 is exactly so", unit="rad",
-                                       low=0.0, high=math.pi)
-    any_goal_heading: bool = option(False, "the path may end with any heading")
-    allow_unknown: bool = option(False, "the vehicle may drive through unknown space")
-    world: PreparedMap | None = None
+    goal_tolerance_xy: float = option(0.0, "maximum distance from the goal at the end of the path; 0 requires the exact position",
+                                      unit="m", low=0.0, high=1e6)
+    goal_tolerance_yaw: float = option(0.0, "maximum heading error at the end of the path; 0 requires the exact heading",
+                                       unit="rad", low=0.0, high=math.pi)
+    any_goal_heading: bool = option(False, "accept any heading at the goal")
+    allow_unknown: bool = option(False, "treat unknown space as free")
+    world: PreparedMap | None = field(default=None, repr=False)
 
     def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None, start: Sequence[float] = (),
                  goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0, goal_tolerance_yaw: float = 0.0,

@@ -5,11 +5,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
+from .audit.verdict import Audit
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
+from .errors import PlanningError
 from .problem import Problem
 from .search.tree import Tree
 from .settings import Settings
+from .vehicle import Point
 
 
 class Status(IntEnum):
@@ -30,11 +33,11 @@ class Status(IntEnum):
     CANCELLED = 213
 
 
-class PlanError(ValueError):
+class PlanError(PlanningError, ValueError):
     """An answer that breaks one of its invariants; the message says which, with its figures."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """The answer to a request; the tree is part of it, also on failure.
 
@@ -44,17 +47,14 @@ class Plan:
         problem, settings: the request, with the seed that was used.
         path: the audited path, or None.
         tree: the search tree; it holds the start alone where nothing was searched.
-        samples: how many samples were drawn.
-        culprit: (x, y) of what shows why there is no path: the nearest obstacle, the narrowest place, the first hit [m]; or None.
-        cancelled: whether it was cancelled; with a path, that is the best by then.
-        time_to_first: until the search found its first path, its audit not counted [s], or None.
-        planning_time: from request to answer, the clearance field not counted [s].
-        map_time: for the clearance field, and the loading of the map where the caller added it [s].
+        samples: number of samples drawn.
+        location: (x, y) of what shows why there is no path [m]: the nearest obstacle, narrowest place or first hit; or None.
+        cancelled: True if it was cancelled; a path is then the best so far.
+        time_to_first: time until the search found its first path, its audit not counted [s], or None.
+        planning_time: time from request to answer, the preparation of the map not counted [s].
+        map_time: time for the preparation of the map, and for loading it where the caller added that [s].
         lower_bound: no path of the problem is shorter [m].
-        min_clearance: by the audit, the least distance to an obstacle from the path, on which the vehicle's reference point runs,
-            where the vehicle is a disc, and from all that it sweeps where it is a polygon [m], or None.
-        max_curvature: of the path, by the audit [1/m], or None.
-        audit: "ok" with a path, else what the audit found, or "" where there was nothing to audit.
+        audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
     """
 
     status: Status
@@ -64,29 +64,45 @@ class Plan:
     tree: Tree
     path: Path | None = None
     samples: int = 0
-    culprit: tuple[float, float] | None = None
+    location: Point | None = None
     cancelled: bool = False
     time_to_first: float | None = None
     planning_time: float = 0.0
     map_time: float = 0.0
     lower_bound: float = 0.0
-    min_clearance: float | None = None
-    max_curvature: float | None = None
-    audit: str = ""
+    audit: Audit | None = None
+
+    def __repr__(self) -> str:
+        return f"Plan({self.status.name}: {self.message})"
+
+    @property
+    def solved(self) -> bool:
+        """True if there is a path."""
+        return self.path is not None
 
     @property
     def length(self) -> float | None:
-        """Of the path [m], or None."""
+        """The length of the path [m], or None."""
         return self.path.length if self.path else None
+
+    @property
+    def min_clearance(self) -> float | None:
+        """The least distance to an obstacle [m], or None without a path.
+
+        From the path, on which the vehicle's reference point runs, where the vehicle is a disc; from all that it sweeps where it
+        is a polygon.
+        """
+        return self.audit.min_clearance if self.audit and self.path else None
+
+    @property
+    def max_curvature(self) -> float | None:
+        """The greatest curvature of the path [1/m], or None."""
+        return self.audit.max_curvature if self.audit and self.path else None
 
     @property
     def gap(self) -> float | None:
         """length / lower_bound - 1, 0 for a path of length 0, infinite where the bound says nothing, None without a path."""
-        if self.path is None:
-            return None
-        if self.lower_bound == 0:
-            return math.inf if self.length > 0 else 0.0
-        return self.length / self.lower_bound - 1
+        return None if self.path is None else gap_above(self.lower_bound, self.path.length)
 
     def check(self) -> None:
         """Check the invariants: those of the tree and of the path, and that all parts of the answer fit each other.
@@ -101,7 +117,7 @@ class Plan:
             raise PlanError(breach)
 
     def _breaches(self) -> Iterator[str]:
-        """A sentence for each invariant that does not hold, with a path or without."""
+        """Yield a sentence for each invariant that does not hold, with a path or without."""
         problem, settings = self.problem, self.settings
         if not self.message or "\n" in self.message:
             yield f"the message is {self.message!r}, not one line"
@@ -129,14 +145,14 @@ class Plan:
         if off > problem.goal_tolerance_xy + JOINT or turned > problem.yaw_tolerance + JOINT:
             yield f"the path ends {off:.3g} m and {turned:.3g} rad from the goal, whose tolerance is " \
                   f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"
-        if self.audit != "ok" or self.min_clearance is None or self.max_curvature is None:
-            yield f"there is a path, but its audit is {self.audit!r} with the least clearance {self.min_clearance} m and " \
-                  f"the curvature {self.max_curvature}/m"
-        elif not (self.max_curvature * problem.vehicle.turning_radius <= 1 + JOINT and self.min_clearance >= 0):
-            yield f"the path bends by {self.max_curvature}/m, the vehicle by {1 / problem.vehicle.turning_radius}/m at most, " \
-                  f"and the least clearance is {self.min_clearance} m"
-        if self.lower_bound > self.length * (1 + ROUNDING):
-            yield f"the path is {self.length} m long, less than the lower bound {self.lower_bound} m"
+        audit, radius = self.audit, problem.vehicle.turning_radius
+        if audit is None or not audit.ok:
+            yield f"there is a path, but its audit is {audit}"
+        elif not (audit.max_curvature * radius <= 1 + JOINT and audit.min_clearance >= 0):
+            yield f"the path bends by {audit.max_curvature}/m, the vehicle by {1 / radius}/m at most, " \
+                  f"and the least clearance is {audit.min_clearance} m"
+        if self.lower_bound > path.length * (1 + ROUNDING):
+            yield f"the path is {path.length} m long, less than the lower bound {self.lower_bound} m"
         if self.time_to_first is None or not 0 <= self.time_to_first <= self.planning_time:
             yield f"the first path came after {self.time_to_first} s of {self.planning_time} s"
         if not self._is_in_tree(path):
@@ -145,14 +161,20 @@ class Plan:
     def _breaches_without_path(self) -> Iterator[str]:
         if self.cancelled != (self.status == Status.CANCELLED):
             yield f"the status is {self.status.name}, and cancelled is {self.cancelled}"
-        if self.audit == "ok" or self.min_clearance is not None or self.max_curvature is not None:
-            yield f"there is no path, but its audit is {self.audit!r} with the least clearance {self.min_clearance} m and " \
-                  f"the curvature {self.max_curvature}/m"
+        if self.audit is not None and self.audit.ok:
+            yield "there is no path, but its audit is ok"
 
     def _is_in_tree(self, path: Path) -> bool:
-        """Whether a node of the tree is reached by just this path."""
+        """Return True if a node of the tree is reached by just this path."""
         ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path.length)
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
+
+
+def gap_above(lower_bound: float, length: float) -> float:
+    """Return length / lower_bound - 1, 0 for a path of length 0, infinite where the bound says nothing."""
+    if lower_bound == 0:
+        return math.inf if length > 0 else 0.0
+    return length / lower_bound - 1
 
 
 @dataclass(frozen=True)
@@ -160,10 +182,10 @@ class Progress:
     """How far a request has come.
 
     Attributes:
-        samples: drawn so far.
-        elapsed: since the request [s].
-        length: of the best path so far [m], or None.
-        improved: whether this report was made because the best path is new.
+        samples: number of samples drawn so far.
+        elapsed: time since the request [s].
+        length: length of the best path so far [m], or None.
+        improved: True if this report was made because the best path is new.
         snapshot: a function that returns the audited Plan so far; it costs an audit, so call it only to use it, and
             only before the callback returns.
     """

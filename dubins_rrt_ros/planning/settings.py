@@ -2,31 +2,32 @@
 
 from dataclasses import dataclass
 
-from .option import convert_options, option
+from .option import convert_options, documented, option
 
 
+@documented
 @dataclass(frozen=True)
 class Settings:
     """The planner's settings.
 
     Raises:
-        OptionError: a field is of the wrong type or out of range.
+        OptionError: an option is of the wrong type or out of range.
     """
 
-    planner: str = option("rrt_star", "the algorithm: rrt ends with its first path, rrt_star uses its whole budget",
+    planner: str = option("rrt_star", "algorithm: rrt ends with its first path, rrt_star uses its whole budget",
                           choices=("rrt", "rrt_star"))
-    samples: int = option(3000, "how many samples are drawn at most", low=1, high=10_000_000)
-    planning_time: float = option(1.0, "the time limit", unit="s", low=0.001, high=3600.0)
-    goal_bias: float = option(0.05, "the share of samples drawn at the goal", low=0.0, high=1.0)
-    step_size: float = option(0.0, "the longest edge, rewired ones too; 0 is unlimited", unit="m", low=0.0, high=1e6)
-    heading_sampling: str = option("mixed", "headings of the samples: uniform in [0, 2 pi); goal, straight towards the goal; "
-                                   "field, along the way there around obstacles; mixed, a fifth uniform, the others near field",
-                                   choices=("uniform", "goal", "field", "mixed"))
-    informed: bool = option(True, "hybrid A* finds a first path, and rrt_star then draws only where it can still become shorter")
-    shortcut: bool = option(True, "each best path is shortened by Dubins shortcuts and detours, and the tree goes on from it")
-    path_spacing: float = option(0.05, "the largest distance between two poses of a published path", unit="m",
+    samples: int = option(3000, "maximum number of samples", low=1, high=10_000_000)
+    planning_time: float = option(1.0, "time limit", unit="s", low=0.001, high=3600.0)
+    goal_bias: float = option(0.05, "share of the samples drawn at the goal", low=0.0, high=1.0)
+    step_size: float = option(0.0, "maximum length of an edge, also when rewired; 0 is unlimited", unit="m", low=0.0, high=1e6)
+    heading_sampling: str = option(
+        "mixed", "headings of the samples: uniform in [0, 2 pi); goal, straight towards the goal; field, along the shortest way "
+        "there around obstacles; mixed, a fifth uniform, the others near field", choices=("uniform", "goal", "field", "mixed"))
+    informed: bool = option(True, "find a first path by hybrid A*, then have rrt_star sample only where it can become shorter")
+    shortcut: bool = option(True, "shorten each best path by Dubins shortcuts and vertex perturbation, and grow the tree from it")
+    path_spacing: float = option(0.05, "maximum distance between two poses of a published path", unit="m",
                                  low=0.001, high=1000.0)
-    seed: int = option(-1, "the seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
+    seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         convert_options(self)

@@ -67,17 +67,18 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: W
     world = World(map, vehicle, allow_unknown)
     if previous is not None and previous.allow_unknown == allow_unknown:
         _reuse(world, previous)
-    world.field.components(vehicle.inner_radius)
-    world.field.free_squares(vehicle.inner_radius)
-    if vehicle.outline:
-        cover(vehicle.outline)
+    world.field.components(vehicle.inscribed_radius)
+    world.field.free_squares(vehicle.inscribed_radius)
+    if vehicle.footprint:
+        cover(vehicle.footprint)
+    world.obstacles  # noqa: B018 - computed now
     return world
 
 
 def _reuse(world: World, previous: World) -> None:
     """Take over from `previous` what `world` has in common with it."""
     if world.map is previous.map:
-        takes_as_much_room = world.vehicle.inner_radius == previous.vehicle.inner_radius
+        takes_as_much_room = world.vehicle.inscribed_radius == previous.vehicle.inscribed_radius
         world.field = previous.field if takes_as_much_room else previous.field.shared()
         world.obstacles = previous.obstacles
     else:

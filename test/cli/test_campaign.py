@@ -18,7 +18,7 @@ from dubins_rrt_ros.evaluation.campaign.runs import results
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner
 from dubins_rrt_ros.planning._kernels.collision import CollisionChecker
 from dubins_rrt_ros.planning.diagnosis import explain as reasons
-from dubins_rrt_ros.planning.diagnosis.explain import Reason
+from dubins_rrt_ros.planning.diagnosis.explain import Diagnosis
 
 START, GOAL, STRAIGHT_ON = (1.0, 1.0, 0.0), (9.0, 6.0, 0.0), (1.0, 6.0, 0.0)
 
@@ -109,7 +109,7 @@ def test_a_collision_check_that_is_too_strict_is_found(monkeypatch):
     (Status.UNKNOWN, "A defect.", "UNKNOWN: A defect."),
 ])
 def test_a_false_status_is_found(status, message, finding, monkeypatch):
-    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Reason(status, message))
+    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Diagnosis(status, message))
     assert finding in " ".join(findings_of(walled_trial(), monkeypatch))
 
 
@@ -118,7 +118,7 @@ def test_a_pose_that_should_have_been_refused_is_found(name, pose, monkeypatch):
     trial = walled_trial()
     trial = replace(trial, problem=replace(trial.problem, **{name: pose}))
     assert findings_of(trial, monkeypatch) == []
-    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Reason(Status.NO_VALID_PATH, "No path exists: x."))
+    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Diagnosis(Status.NO_VALID_PATH, "No path exists: x."))
     assert f"NO_VALID_PATH, but at the {name} the vehicle has no room: -0.4" in " ".join(findings_of(trial, monkeypatch))
 
 

@@ -31,7 +31,8 @@ def made_or_refused(make, *refusals):
     made = read_or_refused(make, *refusals)
     if made is not None:
         for item in options(type(made)):
-            assert type(getattr(made, item.name)) is item.type
+            assert type(values(made)[item.name]) is item.type
+            assert item.convert(values(made)[item.name]) == getattr(made, item.name)
             assert item.convert(getattr(made, item.name)) == getattr(made, item.name)
 
 
@@ -63,8 +64,8 @@ FOOTPRINTS = [[[1.0, 0.4], [-0.5, 0.4], [-0.5, -0.4], [1.0, -0.4]], [[2, 0], [-1
 def test_footprint(text):
     def outline():
         vehicle = Vehicle(footprint=text)
-        assert 0 <= vehicle.inner_radius <= vehicle.robot_radius <= 1000
-        return vehicle.outline
+        assert 0 <= vehicle.inscribed_radius <= vehicle.robot_radius <= 1000
+        return vehicle.footprint
 
     corners = read_or_refused(outline, OptionError)
     assert not corners or len(corners) >= 3

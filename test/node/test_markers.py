@@ -86,7 +86,7 @@ def test_of_a_large_tree_the_lines_of_its_oldest_nodes_are_shown(plans, over_the
 
 
 def test_where_it_failed_is_a_disc_in_sight(plans, over_the_wire):
-    plan = replace(plans["blocked"], culprit=(4.25, 6.5))
+    plan = replace(plans["blocked"], location=(4.25, 6.5))
     culprit = by_namespace(over_the_wire(tree_markers(plan, "map", STAMP, MANY)).markers)["culprit"]
     assert culprit.type == Marker.CYLINDER
     assert (culprit.pose.position.x, culprit.pose.position.y) == (4.25, 6.5)

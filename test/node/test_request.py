@@ -51,8 +51,8 @@ def never():
 def test_a_request_is_answered_as_the_planner_answers_it(request_for):
     reported = []
     answer = request_for(samples=300, planning_time=60.0, seed=1).serve(reported.append, never)
-    assert (answer.status, answer.audit, answer.samples, answer.cancelled) == (Status.NONE, "ok", 300, False)
-    assert all(report.path is not None and report.audit == "ok" for report in reported)
+    assert (answer.status, answer.audit.ok, answer.samples, answer.cancelled) == (Status.NONE, True, 300, False)
+    assert all(report.path is not None and report.audit.ok for report in reported)
     lengths = [plan.length for plan in (*reported, answer)]
     assert lengths == sorted(lengths, reverse=True)
 
@@ -125,12 +125,12 @@ def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, m
     """And what it would have answered is not reported."""
     def report_broken(problem, settings, *, cancel, on_progress):
         answer = plan(problem, settings)
-        on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit="")))
+        on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit=None)))
         return answer
 
     monkeypatch.setattr(module, "plan", report_broken)
     request = replace(request_for(samples=10, planning_time=60.0, seed=1), check_invariants=True)
-    with pytest.raises(PlanError, match="its audit is ''"):
+    with pytest.raises(PlanError, match="its audit is None"):
         request.serve(pytest.fail, never)
 
 

@@ -52,7 +52,7 @@ def obstacles_of(map):
 def placed(vehicle, poses):
     """The footprint at each of the poses."""
     x, y, theta = (values[:, None] for values in np.asarray(poses).T)
-    ahead, left = np.array(vehicle.outline).T
+    ahead, left = np.array(vehicle.footprint).T
     return shapely.polygons(np.stack([x + np.cos(theta) * ahead - np.sin(theta) * left,
                                       y + np.sin(theta) * ahead + np.cos(theta) * left], axis=-1))
 
@@ -335,7 +335,7 @@ def bounds(map, vehicle, arcs):
     index, begin = np.arange(len(arcs.length)), np.zeros(len(arcs.length))
     squares = (audit_obstacles.PathsideSquares(map, False, arcs.x + 1j * arcs.y, 20.0, 20.0) if isinstance(map, GridMap)
                else audit_obstacles.PolygonObstacles(map.free))
-    outline = audit_sweep.Outline(vehicle.outline, squares)
+    outline = audit_sweep.Outline(vehicle.footprint, squares)
     ends = [outline.clearance(*arcs.at(index, s)) for s in (begin, arcs.length)]
     return outline.bound(arcs, index, begin, arcs.length, *ends)
 

@@ -45,7 +45,7 @@ def check_parts(found, polygon):
 
 @pytest.mark.parametrize("kind", OUTLINES)
 def test_a_footprint_is_covered(kind):
-    check_cover(Vehicle(footprint=OUTLINES[kind]).outline)
+    check_cover(Vehicle(footprint=OUTLINES[kind]).footprint)
 
 
 @pytest.mark.slow
@@ -55,11 +55,11 @@ def test_any_footprint_is_covered(corners):
     outline = [[r * math.cos(angle), r * math.sin(angle)] for angle, r in sorted(corners)]
     polygon = shapely.Polygon(outline)
     assume(polygon.is_valid and polygon.area > 1e-3 and polygon.contains(shapely.Point(0, 0)))
-    check_cover(Vehicle(footprint=str(outline)).outline)
+    check_cover(Vehicle(footprint=str(outline)).footprint)
 
 
 def test_a_car_is_covered_by_few_discs_tightly():
-    found = cover(Vehicle(footprint=CAR).outline)
+    found = cover(Vehicle(footprint=CAR).footprint)
     assert len(found.discs) == 10
     assert found.excess < 0.19
     assert len(found.first_corner) == 2

@@ -11,6 +11,7 @@ from support.cases import chain_over, empty_map, path_of, random_maps, random_po
 from support.planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import (
+    Audit,
     ClearanceField,
     CurveError,
     DubinsCurve,
@@ -215,9 +216,11 @@ PLANS = {
     "another goal": ("ends 0.5 m and 0 rad from the goal, whose tolerance is 0.2 m", lambda p: of_another(
         p, goal=moved(GOAL, x=0.5), goal_tolerance_xy=0.2)),
     "another goal's heading": ("ends 0 m and 0.5 rad", lambda p: of_another(p, goal=moved(GOAL, theta=0.5))),
-    "no audit": ("its audit is ''", lambda p: replace(p, audit="")),
-    "no clearance": ("the least clearance None m", lambda p: replace(p, min_clearance=None)),
-    "too tight a turn": ("the path bends by 2.1/m, the vehicle by 2.0/m", lambda p: replace(p, max_curvature=2.1)),
+    "no audit": ("its audit is None", lambda p: replace(p, audit=None)),
+    "a failed audit": ("its audit is it jumps", lambda p: replace(p, audit=replace(p.audit, findings=("it jumps",)))),
+    "a clearance below 0": ("the least clearance is -0.1 m", lambda p: replace(p, audit=replace(p.audit, min_clearance=-0.1))),
+    "too tight a turn": ("the path bends by 2.1/m, the vehicle by 2.0/m",
+                         lambda p: replace(p, audit=replace(p.audit, max_curvature=2.1))),
     "its first path too late": ("the first path came after 9.0 s", lambda p: replace(p, time_to_first=9.0, planning_time=1.0)),
     "no time of its first path": ("the first path came after None s", lambda p: replace(p, time_to_first=None)),
     "a path that is not in the tree": ("is not in the tree of", shorter_way),
@@ -243,7 +246,7 @@ def test_check_finds_a_plan_whose_tree_or_path_is_broken(answer):
 def test_check_finds_a_failure_with_what_only_a_path_has():
     failed = plan(Problem(walled(), VEHICLE, START, GOAL), settings("rrt"))
     failed.check()
-    for message, broken in (("audit is 'ok'", {"audit": "ok"}), ("least clearance 0.1 m", {"min_clearance": 0.1}),
+    for message, broken in (("audit is ok", {"audit": Audit((), 0.1, 2.0)}),
                             ("NO_VALID_PATH, and cancelled is True", {"cancelled": True}),
                             ("CANCELLED, and cancelled is False", {"status": Status.CANCELLED})):
         with pytest.raises(PlanError) as caught:

@@ -1,11 +1,13 @@
 """Every option of Settings, Vehicle and Problem: what it takes, and what it says when it does not."""
 
+import inspect
 import math
 from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
 
+from dubins_rrt_ros import planning
 from dubins_rrt_ros.planning import GridMap, InvalidPose, OptionError, Problem, Settings, Vehicle, checked_pose, options, values
 
 MAP = GridMap(np.zeros((4, 4)), 1.0)
@@ -155,3 +157,21 @@ def test_what_counts_as_an_exact_goal():
     assert not make(any_goal_heading=True).exact_goal
     assert make(any_goal_heading=True).yaw_tolerance == math.pi
     assert make(goal_tolerance_yaw=0.3).yaw_tolerance == 0.3
+
+
+@pytest.mark.parametrize("cls", MAKE)
+def test_help_shows_every_option_with_unit_and_range(cls):
+    text = " ".join(cls.__doc__.split())
+    for item in options(cls):
+        assert f"{item.name} (" in text and f": {item.describe()}" in text
+
+
+def test_a_problem_takes_its_options_with_their_defaults():
+    """Its constructor is written out, to take a World."""
+    defaults = {name: parameter.default for name, parameter in inspect.signature(Problem).parameters.items()}
+    assert {item.name: item.default for item in options(Problem)}.items() <= defaults.items()
+
+
+def test_all_errors_have_one_base():
+    raised = [item for item in vars(planning).values() if isinstance(item, type) and issubclass(item, Exception)]
+    assert len(raised) == 10 and all(issubclass(error, planning.PlanningError) for error in raised)

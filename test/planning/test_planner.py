@@ -1,6 +1,7 @@
 """The contract that every planner meets: it answers each request with a path or a reason, within its limits."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import shapely
 from support.cases import empty_map, needs_compiled, scaled
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, settings, walled
 
-from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Status, Vehicle, audit_path, load_map, plan
+from dubins_rrt_ros.planning import GridMap, PolygonMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 
@@ -26,7 +27,7 @@ def maze(request):
 def test_solves(planner):
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))
     assert result.status == Status.NONE
-    assert result.audit == "ok"
+    assert result.solved and result.audit.ok
     assert result.path.start == START
     assert result.path.end == GOAL
     poses = result.path.poses(0.05)
@@ -66,7 +67,7 @@ def test_a_point_does_not_drive_through_a_wall(planner, x, y):
 def test_proves_that_there_is_no_way(planner, map):
     result = plan(Problem(map, VEHICLE, START, GOAL), settings(planner))
     assert_refused(result, Status.NO_VALID_PATH, "No path exists: walls separate start and goal")
-    assert result.culprit is None
+    assert result.location is None
     assert result.samples == 0
     assert len(result.tree) == 1
 
@@ -107,7 +108,7 @@ def test_a_boxed_in_start_is_told(planner):
     assert result.status == Status.NO_VALID_PATH
     assert "every forward arc from the start hits an obstacle within 0.16 m, the longest at (11.00, 9.99)" in result.message
     assert "move or turn the start" in result.message
-    assert result.culprit == pytest.approx((11.0, 9.99), abs=0.01)
+    assert result.location == pytest.approx((11.0, 9.99), abs=0.01)
 
 
 @pytest.mark.parametrize("pose, by", [((-10.5, 0, 0), "0.50 m"), ((0, 10.01, 0), "0.01 m"), ((0, 10.0004, 0), "0.0004 m"),
@@ -118,7 +119,7 @@ def test_outside_the_map(planner, pose, by):
     assert_refused(result, Status.START_OUTSIDE_MAP, "Start", *words)
     result = plan(Problem(empty_map(), VEHICLE, START, pose), settings(planner))
     assert_refused(result, Status.GOAL_OUTSIDE_MAP, "Goal", *words)
-    assert result.culprit == pytest.approx(np.clip(pose[:2], -10, 10))
+    assert result.location == pytest.approx(np.clip(pose[:2], -10, 10))
 
 
 @pytest.mark.parametrize("pose, words", [
@@ -162,7 +163,7 @@ def test_the_tolerance_excuses_a_goal_outside_or_in_an_obstacle(planner, goal, a
 def test_start_equal_to_goal(planner):
     result = plan(Problem(empty_map(), VEHICLE, START, (*START[:2], START[2] + math.tau)), settings(planner))
     assert result.status == Status.NONE
-    assert (result.length, result.gap, result.samples, result.audit) == (0, 0, 0, "ok")
+    assert (result.length, result.gap, result.samples, result.audit.ok) == (0, 0, 0, True)
     assert result.path.poses(0.05).tolist() == [list(START)]
 
 
@@ -224,9 +225,9 @@ def test_a_path_that_fails_the_audit_is_a_defect_and_not_a_path(planner, monkeyp
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner))
     assert result.status == Status.UNKNOWN
     assert result.path is None
-    assert "the clearance is" in result.audit
+    assert "the clearance is" in str(result.audit)
     assert "defect in the planner" in result.message
-    assert result.audit in result.message
+    assert str(result.audit) in result.message
 
 
 def test_the_numbers_of_the_statuses():
@@ -248,3 +249,15 @@ def test_hybrid_a_star_finds_a_goal_that_is_never_drawn(planner):
     assert result.status is Status.NONE
     assert result.samples == (0 if planner == "rrt" else 50)
     assert result.length == pytest.approx(result.lower_bound, abs=1e-6)
+
+
+def test_a_problem_alone_is_planned_with_the_default_settings():
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL))
+    assert result.solved
+    assert replace(result.settings, seed=-1) == Settings()
+
+
+def test_a_plan_is_shown_in_one_line():
+    solved, failed = (plan(Problem(empty_map(), VEHICLE, START, goal), settings("rrt")) for goal in (GOAL, (99.0, 0.0, 0.0)))
+    assert repr(solved) == f"Plan(NONE: {solved.message})"
+    assert repr(failed).startswith("Plan(GOAL_OUTSIDE_MAP: Goal (99, 0) is ") and not failed.solved

@@ -167,7 +167,7 @@ def test_progress_tells_of_every_better_path():
         assert (snapshot.path is None) == (progress.length is None)
         if snapshot.path:
             assert snapshot.message.startswith(f"Path of {snapshot.length:.2f} m so far, at most ")
-            assert snapshot.audit == "ok"
+            assert snapshot.audit.ok
             assert audit_path(snapshot.path, problem).ok
             assert snapshot.length == pytest.approx(progress.length)
             assert isinstance(snapshot.tree, Tree)

@@ -61,10 +61,10 @@ def test_too_narrow_a_gap_in_a_grid_is_measured(resolution, gap, width, radius, 
     result = why(problem)
     middle = map.to_map_frame(np.array([10.0, (gap.start + gap.stop) / 2 * resolution]))
     assert result.status == Status.NO_VALID_PATH
-    x, y = (round(coordinate, 2) + 0.0 for coordinate in result.culprit)
+    x, y = (round(coordinate, 2) + 0.0 for coordinate in result.location)
     assert (f"the widest way found between start and goal is {width} wide at ({x:.2f}, {y:.2f}); "
             f"with radius {radius} instead of 0.9 m they are connected") in result.message
-    assert result.culprit == pytest.approx(middle, abs=0.3)
+    assert result.location == pytest.approx(middle, abs=0.3)
     assert are_connected(problem, float(radius[:-2]))
     assert not are_connected(problem, float(radius[:-2]) + 0.0101)
 
@@ -79,7 +79,7 @@ def test_too_narrow_a_gap_in_polygons_is_measured(gap):
     assert gap - 2 * spacing < width <= gap + 0.005
     assert (width - spacing) / 2 - 0.02 < radius < gap / 2
     assert are_connected(problem, radius)
-    assert result.culprit == pytest.approx((0.0, 3 + gap / 2), abs=0.5)
+    assert result.location == pytest.approx((0.0, 3 + gap / 2), abs=0.5)
 
 
 def test_a_proof_before_the_search_names_the_narrowest_place():
@@ -109,7 +109,7 @@ def test_a_gap_narrower_than_the_lattice_is_bounded():
     width = float(re.search(r"no way between start and goal is wider than ([\d.]+) m, and robot_radius is", result.message)[1])
     assert 4 * lattice_spacing(problem.map, ClearanceField(problem.map)) <= width < 1
     assert not are_connected(problem, width / 2)
-    assert result.culprit is None
+    assert result.location is None
 
 
 @pytest.mark.parametrize("map", [
@@ -119,7 +119,7 @@ def test_walls_separate_at_any_size(map):
     result = why(Problem(map, Vehicle(0.5, 0.2), START, GOAL))
     assert result.message == ("No path exists: walls separate start and goal, so that no robot_radius is small enough; "
                               "check the map.")
-    assert (result.samples, result.culprit) == (0, None)
+    assert (result.samples, result.location) == (0, None)
 
 
 def test_cells_that_touch_in_a_corner_are_a_wall_for_any_size():
@@ -139,8 +139,8 @@ def test_unknown_space_that_separates_is_named_with_where_it_begins(resolution, 
     start, goal = ((*map.to_map_frame(np.array(at)).tolist(), 0.0) for at in ((2.0, 2.0), (18.0, 17.0)))
     result = why(Problem(map, Vehicle(0.5, 0.2), start, goal))
     assert result.message.startswith("No path exists: unknown space separates start and goal for robot_radius 0.2 m; on the way "
-                                     f"between them it begins at ({result.culprit[0]:.2f}, {result.culprit[1]:.2f}); drive there")
-    assert map.to_grid_frame(np.array(result.culprit))[0] == pytest.approx(10 - round(0.5 / resolution) * resolution)
+                                     "between them it begins at ({:.2f}, {:.2f}); drive there".format(*result.location))
+    assert map.to_grid_frame(np.array(result.location))[0] == pytest.approx(10 - round(0.5 / resolution) * resolution)
 
 
 def test_unknown_space_that_leaves_too_narrow_a_gap_is_named():
@@ -211,7 +211,7 @@ def test_the_figures_of_an_occupied_pose():
             result = why(Problem(map, Vehicle(0.5, 0.2), (x, 1.0, 0.0), GOAL))
             assert result.status == Status.START_OCCUPIED
             assert result.message.startswith(f"Start is occupied: {sentence}")
-            assert result.culprit == pytest.approx((np.sign(x) * 10 if x < -9 else min(x, 0.5), 1.0))
+            assert result.location == pytest.approx((np.sign(x) * 10 if x < -9 else min(x, 0.5), 1.0))
 
 
 def test_an_occupied_pose_between_unknown_and_occupied_cells():
@@ -258,7 +258,7 @@ def test_the_figures_of_a_pose_outside():
     assert result.status == Status.START_OUTSIDE_MAP
     assert ("is 0.50 m outside the map, which spans 20.00 m x 10.00 m from its corner (1.00, 2.00) on, turned by 0.524 rad; "
             "check the pose and its frame.") in result.message
-    assert result.culprit == pytest.approx(turned.to_map_frame(np.array([20.0, 5.0])))
+    assert result.location == pytest.approx(turned.to_map_frame(np.array([20.0, 5.0])))
     result = why(Problem(empty_map(), Vehicle(), START, (10.7, 0.0, 0.0), goal_tolerance_xy=0.75))
     assert result.status == Status.GOAL_OUTSIDE_MAP
     assert result.message == ("Goal (10.7, 0) is 0.70 m outside the map, which spans x -10.00 to 10.00 m and y -10.00 to "
@@ -291,8 +291,8 @@ def test_a_start_that_faces_a_wall():
     within, y = math.asin(0.4995), 10 + 1 - math.cos(math.asin(0.4995))
     assert f"every forward arc from the start hits an obstacle within {math.ceil(100 * within) / 100} m, " in result.message
     assert result.message.endswith("move or turn the start, or check turning_radius (1 m).")
-    assert result.culprit[0] == pytest.approx(11.0)
-    assert abs(result.culprit[1] - 10) == pytest.approx(y - 10, abs=0.002)
+    assert result.location[0] == pytest.approx(11.0)
+    assert abs(result.location[1] - 10) == pytest.approx(y - 10, abs=0.002)
 
 
 @pytest.mark.parametrize("status", [Status.NO_VALID_PATH, Status.TIMEOUT])
@@ -304,7 +304,7 @@ def test_a_goal_with_its_back_to_a_wall(status):
     assert ("no forward arc reaches the goal: every one that ends there comes through an obstacle within the last 0.53 m, "
             "the longest at (11.00, ") in result.message
     assert "move or turn the goal" in result.message
-    assert result.culprit[0] == pytest.approx(11.0)
+    assert result.location[0] == pytest.approx(11.0)
 
 
 def test_arcs_that_end_at_the_edge_of_the_map():
@@ -324,7 +324,7 @@ def test_a_free_start_and_goal_are_not_blamed():
                            result.message)[1])
     assert near <= said <= near + 0.01
     assert f"60 of 60 samples drawn, {len(result.tree)} tree nodes, " in result.message
-    assert result.culprit is None
+    assert result.location is None
     late = why(hard, samples=1_000_000, planning_time=0.1 if kernels_compiled else 3.0)
     assert "allow more time, or loosen the goal's tolerance" in late.message
 
@@ -350,7 +350,7 @@ def test_a_footprint_that_touches_is_told_where(turned, status):
     if status:
         assert result.message.startswith("Start is occupied: the footprint touches ")
         assert result.message.endswith("; move or turn it, or make footprint smaller if the robot is.")
-        assert result.culprit[0] in (pytest.approx(0.0), pytest.approx(1.0))
+        assert result.location[0] in (pytest.approx(0.0), pytest.approx(1.0))
 
 
 def test_unknown_space_under_a_footprint_is_told():

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from dubins_rrt_ros.planning import OptionError, Vehicle, values
@@ -27,8 +28,43 @@ def test_a_vehicle_is_made_again_from_its_values():
         assert Vehicle(**values(vehicle)) == vehicle
 
 
+def test_a_footprint_is_its_corners_counter_clockwise():
+    corners = ((1.0, 0.0), (0.0, 1.0), (-1.0, -1.0))
+    for given in (corners, list(corners), np.array(corners), "[[1, 0], [0, 1], [-1, -1]]"):
+        assert Vehicle(footprint=given).footprint == corners
+        assert Vehicle.from_footprint(given, turning_radius=2.0) == Vehicle(2.0, footprint=corners)
+    assert Vehicle(footprint=corners[::-1]).footprint == ((-1.0, -1.0), (0.0, 1.0), (1.0, 0.0))[::-1]
+    assert Vehicle().footprint == () == Vehicle(footprint="").footprint
+
+
+def test_its_text_is_what_files_and_parameters_hold():
+    assert values(Vehicle(footprint="[[1,0],[0,1],[-1,-1]]"))["footprint"] == "[[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]]"
+    assert values(Vehicle())["footprint"] == ""
+
+
+def test_the_radii_around_the_reference_point():
+    vehicle = Vehicle(footprint=[(3, 0.9), (3, -0.9), (-1, -0.9), (-1, 0.9)])
+    assert (vehicle.inscribed_radius, vehicle.circumscribed_radius) == (pytest.approx(0.9), math.hypot(3, 0.9))
+    assert (Vehicle(1.0, 0.3).inscribed_radius, Vehicle(1.0, 0.3).circumscribed_radius) == (0.3, 0.3)
+
+
+def test_a_vehicle_of_a_wheelbase():
+    vehicle = Vehicle.from_wheelbase(2.0, 0.5, robot_radius=0.7)
+    assert vehicle == Vehicle(robot_radius=0.7, wheelbase=2.0, max_steering_angle=0.5)
+    for wheelbase, angle in ((0, 0), (2.0, 0), (0, 0.5)):
+        with pytest.raises(OptionError, match="give both above 0"):
+            Vehicle.from_wheelbase(wheelbase, angle)
+
+
+def test_a_vehicle_of_no_footprint_is_refused():
+    for nothing in ((), "", []):
+        with pytest.raises(OptionError, match="give at least three corners"):
+            Vehicle.from_footprint(nothing)
+
+
 @pytest.mark.parametrize("footprint", [
-    "[]", "[[1, 0], [0, 1]]", "[[1, 0], [0, 1], [1]]", "[[1, 0], [0, 1], [1, 2, 3]]", "[[1, 0], [0, 1], [NaN, 0]]",
+    [], None, 5, [1, 2, 3], [(1, 0), (0, 1)], [(1, 0), (0, 1), (-1, "x")], "[]",
+    "[[1, 0], [0, 1]]", "[[1, 0], [0, 1], [1]]", "[[1, 0], [0, 1], [1, 2, 3]]", "[[1, 0], [0, 1], [NaN, 0]]",
     "[[1, 0], [0, 1], [Infinity, 0]]", "[[1, 0], [0, 1], [\"a\", 0]]", "[1, 2, 3]", "{}", "3", "null", "a car", "[" * 100_000])
 def test_a_footprint_that_is_no_outline_is_refused_with_an_example(footprint):
     with pytest.raises(OptionError, match="give at least three corners") as refusal:

@@ -31,7 +31,7 @@ def parts_of(world):
     """All that was computed, as arrays."""
     kernel = world.field.kernel
     names = ("field", "aside") if isinstance(world.map, GridMap) else ("field",)
-    need = world.vehicle.inner_radius
+    need = world.vehicle.inscribed_radius
     squares = world.field.free_squares(need)
     return [*(np.array(getattr(kernel, name)) for name in names), world.field.components(need), squares.is_free,
             np.array(squares.cells), np.array(kernel.resolution)]

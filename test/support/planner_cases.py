@@ -28,8 +28,8 @@ def hard_to_reach():
 def assert_refused(result, status, *words):
     assert result.status == status
     assert result.path is result.length is result.gap is None
-    assert result.culprit is None or (len(result.culprit) == 2 and all(type(c) is float for c in result.culprit))
-    assert result.audit == ""
+    assert result.location is None or (len(result.location) == 2 and all(type(c) is float for c in result.location))
+    assert result.audit is None
     assert len(result.tree) >= 1
     assert "\n" not in result.message
     for word in words:

@@ -94,7 +94,7 @@ def _line(task: Task, answer: Plan, trace: list[list[float]], map_time: float) -
         "solved": solved, "error_name": answer.status.name, "time_to_first": first_time, "first_cost": first_cost,
         "final_cost": answer.length, "total_s": answer.planning_time, "samples": int(answer.samples),
         "vertices": len(answer.tree), "map_ms": 1000 * map_time, "trace": trace,
-        "path": answer.path.poses(_spacing(answer.problem.map)).tolist() if solved else [], "audit": answer.audit,
+        "path": answer.path.poses(_spacing(answer.problem.map)).tolist() if solved else [], "audit": str(answer.audit or ""),
     }
 
 

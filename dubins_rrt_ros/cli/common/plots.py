@@ -62,7 +62,7 @@ def draw_plan(file: str, plan: Plan) -> None:
     path = plan.path.poses(plan.settings.path_spacing) if plan.path else np.empty((0, 3))
     title, subtitle = _captions(plan)
     draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
-                       plan.tree.segments(size / 400), path, title, subtitle, plan.culprit))
+                       plan.tree.segments(size / 400), path, title, subtitle, plan.location))
 
 
 def _captions(plan: Plan) -> tuple[str, str]:
@@ -120,11 +120,11 @@ def frame(axes: Axes, map: Map) -> None:
 def draw_poses(axes: Axes, start: Sequence[float], goal: Sequence[float], vehicle: Vehicle) -> None:
     """Draw the vehicle at the start and at the goal, with arrows and names, on axes that `frame` has fitted to the map."""
     reach = vehicle.robot_radius
-    arrow = max(2.2 * vehicle.inner_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    arrow = max(2.2 * vehicle.inscribed_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
     _draw_pose(axes, start, START, vehicle, arrow)
     _draw_pose(axes, goal, GOAL, vehicle, arrow)
     # Behind the start and ahead of the goal, where no path runs.
-    beside = max(1.3 * vehicle.inner_radius, 0.3 * arrow)
+    beside = max(1.3 * vehicle.inscribed_radius, 0.3 * arrow)
     _draw_name(axes, "start", start, START, -max(1.1 * reach, beside), beside)
     _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * reach), max(1.1 * arrow, beside))
 
@@ -203,7 +203,7 @@ def _draw_path(axes: Axes, drawing: Drawing) -> None:
 
 def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
     """What the vehicle covers along a path, with straight lines from pose to pose."""
-    if not vehicle.outline:
+    if not vehicle.footprint:
         line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
         # Without the corners that are too flat to see, and most of the file.
         return line.buffer(vehicle.robot_radius).simplify(FLAT * vehicle.robot_radius)
@@ -214,9 +214,9 @@ def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
 def _body(vehicle: Vehicle, pose: Sequence[float]) -> shapely.Polygon:
     """What the vehicle covers at a pose."""
     x, y, theta = pose
-    if not vehicle.outline:
+    if not vehicle.footprint:
         return shapely.Point(x, y).buffer(vehicle.robot_radius)
-    return shapely.Polygon(Affine2D().rotate(theta).translate(x, y).transform(vehicle.outline))
+    return shapely.Polygon(Affine2D().rotate(theta).translate(x, y).transform(vehicle.footprint))
 
 
 def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:

@@ -137,7 +137,7 @@ def _of_ends(problem: Problem, answer: Plan) -> Iterator[str]:
         if _REFUSALS.get(answer.status) == name:
             yield from _of_refusal(answer.status, room, _away_from(problem.map, pose))
             return  # nothing is claimed of the other
-        if is_one_pose and (room < -ROUNDING or (room <= 0 and problem.vehicle.outline)):
+        if is_one_pose and (room < -ROUNDING or (room <= 0 and problem.vehicle.footprint)):
             yield f"{answer.status.name}, but at the {name} the vehicle has no room: {room:.6g} m"
 
 
@@ -156,7 +156,7 @@ def _room_around(problem: Problem, goal: Pose) -> float:
     bearing = np.linspace(0, math.tau, 24, endpoint=False)
     ring = np.column_stack([np.cos(bearing), np.sin(bearing)])
     points = np.vstack([[(0.0, 0.0)], ring / 2, ring]) * problem.goal_tolerance_xy + goal[:2]
-    return float(clearances(points, problem).max()) - problem.vehicle.inner_radius
+    return float(clearances(points, problem).max()) - problem.vehicle.inscribed_radius
 
 
 def _away_from(map: Map, pose: Pose) -> float:
@@ -179,7 +179,7 @@ def _of_failure(trial: Trial, answer: Plan) -> Iterator[str]:
 
 def _is_connected(problem: Problem) -> bool:
     """Whether a disc as wide as the vehicle everywhere around its reference point, with a millimetre to spare, can get there."""
-    need = (problem.vehicle.inner_radius + MARGIN) / math.cos(math.pi / 4 / QUARTER)
+    need = (problem.vehicle.inscribed_radius + MARGIN) / math.cos(math.pi / 4 / QUARTER)
     room = _free_space(problem).buffer(-need, quad_segs=QUARTER)
     start, goal = (shapely.Point(_in_frame(problem.map, pose)) for pose in (problem.start, problem.goal))
     return any(part.distance(start) == 0 and part.distance(goal) <= max(0.0, problem.goal_tolerance_xy - ROUNDING)

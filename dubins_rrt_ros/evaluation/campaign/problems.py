@@ -161,7 +161,7 @@ def _corner(rng: np.random.Generator) -> Trial:
     vehicle, reach = _of_half_width(rng, half, chamfered=False)
     radius = half + reach * log_uniform(rng, 0.3, 5.0)
     vehicle = replace(vehicle, turning_radius=radius)
-    farthest = max((abs(x) for x, _ in vehicle.outline), default=0.0)
+    farthest = max((abs(x) for x, _ in vehicle.footprint), default=0.0)
     gap = TO_SPARE if fits else -LACKING / 2
     away = math.hypot(farthest, radius + half) + gap if outer else radius - half - gap
     bearing, half_turn = rng.uniform(-math.pi, math.pi), rng.uniform(0.3, 1.4)

@@ -48,7 +48,7 @@ def curve_gap(curve: DubinsCurve, problem: Problem) -> tuple[float, float]:
 
 def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
     """The gaps between the vehicle and the obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
-    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
+    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.footprint
     x, y, theta = np.asarray(poses, dtype=float).T
     if not outline:
         return Disc(obstacles_of(map, unknown)).clearance(x, y, theta) - problem.vehicle.robot_radius
@@ -70,4 +70,4 @@ def _only(curve: DubinsCurve, problem: Problem) -> Arcs:
 
 
 def _own_radius(problem: Problem) -> float:
-    return 0.0 if problem.vehicle.outline else problem.vehicle.robot_radius
+    return 0.0 if problem.vehicle.footprint else problem.vehicle.robot_radius

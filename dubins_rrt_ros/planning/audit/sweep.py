@@ -76,7 +76,7 @@ def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacl
         obstacles: those of the problem's map, where they are at hand.
     """
     vehicle = problem.vehicle
-    need = slack + (TOUCH if vehicle.outline else max(vehicle.robot_radius, POINT))
+    need = slack + (TOUCH if vehicle.footprint else max(vehicle.robot_radius, POINT))
     least, (x, y), decided = _least_clearance(arcs, problem, need, obstacles)
     findings = []
     if not decided:
@@ -88,7 +88,7 @@ def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacl
 
 
 def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
-    if vehicle.outline:
+    if vehicle.footprint:
         return f"the footprint's clearance is {least:.6f} m, " + (f"no more than {off}" if off else "which is contact")
     return (f"the clearance is {least:.6f} m, less than the robot's radius, {vehicle.robot_radius:g} m"
             + (f", and {off}" if off else ""))
@@ -99,7 +99,7 @@ _Least = tuple[float, tuple[float, float], bool]
 
 def _least_clearance(arcs: Arcs, problem: Problem, need: float, obstacles: Obstacles | None) -> _Least:
     """The least clearance, where it is, and whether no piece can hide contact."""
-    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.outline
+    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.footprint
     if not outline:
         return _narrow_down(arcs, Disc(obstacles or obstacles_of(map, unknown)), need)
     if not isinstance(map, GridMap):

@@ -38,6 +38,9 @@ class Audit:
         """Whether nothing was found."""
         return not self.findings
 
+    def __str__(self) -> str:
+        return "; ".join(self.findings) or "ok"
+
 
 def audit_path(path: Path, problem: Problem, obstacles: Obstacles | None = None) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance.

@@ -88,10 +88,10 @@ class ClearanceField:
 
     def body(self, vehicle: Vehicle) -> CollisionChecker:
         """The vehicle's body on the map, for one thread."""
-        if not vehicle.outline:
+        if not vehicle.footprint:
             return CollisionChecker(self.kernel, vehicle.robot_radius)
-        found = cover(vehicle.outline)
-        return PolygonChecker(self.kernel, vehicle.inner_radius, found.discs, found.corners, found.first_corner,
+        found = cover(vehicle.footprint)
+        return PolygonChecker(self.kernel, vehicle.inscribed_radius, found.discs, found.corners, found.first_corner,
                            max(found.excess, 2 * MARGIN))
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._kernels import dubins as _kernel
+from ..errors import PlanningError
 from ..problem import Pose
 
 WORDS: tuple[str, ...] = _kernel.WORDS
@@ -19,7 +20,7 @@ WORDS: tuple[str, ...] = _kernel.WORDS
 ROUNDING = 1e-9
 
 
-class CurveError(ValueError):
+class CurveError(PlanningError, ValueError):
     """A curve that breaks one of its invariants; the message says which, with its figures."""
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import PlanningError
 from ..problem import Pose
 from .dubins import CurveError, DubinsCurve
 
@@ -12,7 +13,7 @@ from .dubins import CurveError, DubinsCurve
 JOINT = 1e-6
 
 
-class PathError(ValueError):
+class PathError(PlanningError, ValueError):
     """A path that breaks one of its invariants; the message says which, with its figures."""
 
 

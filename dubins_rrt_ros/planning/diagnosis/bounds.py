@@ -89,7 +89,7 @@ def are_separated(problem: Problem, field: ClearanceField) -> bool:
 
     The components are those of a superset of the free space, so that True is a proof; False proves nothing.
     """
-    return (_have_different_labels(problem, field, field.components(problem.vehicle.inner_radius))
+    return (_have_different_labels(problem, field, field.components(problem.vehicle.inscribed_radius))
             or (isinstance(problem.map, PolygonMap) and _are_in_different_parts(problem)))
 
 
@@ -119,7 +119,7 @@ def widest_way(problem: Problem, field: ClearanceField) -> Way | None:
     is_target = np.zeros(lattice.rows * lattice.columns, np.int8)
     is_target[targets] = 1
     search = WidestPathSearch(field.kernel, lattice.first, lattice.along, (lattice.rows, lattice.columns), is_target,
-                              lattice.spacing / 2, problem.vehicle.inner_radius + MARGIN + lattice.spacing)
+                              lattice.spacing / 2, problem.vehicle.inscribed_radius + MARGIN + lattice.spacing)
     _, nodes = search.widest_path(int(starts[np.argmax(field.at(lattice.points(starts)))]))
     if len(nodes) == 0:
         return None
@@ -136,7 +136,7 @@ def widest_way_through_unknown(problem: Problem) -> Way | None:
         return None
     grid = _coarsened(problem.map, math.ceil(math.sqrt(problem.map.data.size / MOST_CELLS)))
     way = widest_way(replace(problem, map=grid, allow_unknown=True), ClearanceField(grid, allow_unknown=True))
-    return way if way and way.radius >= problem.vehicle.inner_radius else None
+    return way if way and way.radius >= problem.vehicle.inscribed_radius else None
 
 
 def lattice_spacing(map: Map, field: ClearanceField) -> float:

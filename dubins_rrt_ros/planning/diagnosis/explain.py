@@ -37,42 +37,42 @@ OBSTACLE, UNKNOWN_SPACE, MAP_EDGE = "obstacle", "unknown space", "the map's edge
 
 
 @dataclass(frozen=True)
-class Reason:
+class Diagnosis:
     """Why there is no path.
 
     Attributes:
         status: what a plan without a path says.
         message: one sentence.
-        culprit: (x, y) of what shows it [m], or None.
+        location: (x, y) of what shows it [m], or None.
     """
 
     status: Status
     message: str
-    culprit: Point | None = None
+    location: Point | None = None
 
 
-def before_search(problem: Problem, field: ClearanceField) -> Reason | None:
+def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
     """Why there provably is no path, where no search is needed to know it."""
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
             ("Goal", problem.goal, problem.goal_tolerance_xy, Status.GOAL_OUTSIDE_MAP, Status.GOAL_OCCUPIED)):
         nearest = nearest_in_map(problem.map, pose[:2])
         away = math.dist(pose[:2], nearest)
-        if away > tolerance + ROUNDING or has_no_room(field, problem.vehicle.inner_radius + MARGIN, pose[:2], tolerance):
+        if away > tolerance + ROUNDING or has_no_room(field, problem.vehicle.inscribed_radius + MARGIN, pose[:2], tolerance):
             if away > ROUNDING:
-                return Reason(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
-            return Reason(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
+                return Diagnosis(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
+            return Diagnosis(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
         is_one_pose = pose is problem.start or problem.exact_goal
-        if problem.vehicle.outline and is_one_pose and not field.pose_is_free(pose, problem.vehicle):
-            return Reason(occupied, *_overlapping(problem, field, name, pose))
+        if problem.vehicle.footprint and is_one_pose and not field.pose_is_free(pose, problem.vehicle):
+            return Diagnosis(occupied, *_overlapping(problem, field, name, pose))
     if are_separated(problem, field):
-        between, culprit = _unknown_between(problem, field) or _narrow_between(problem, field, widest_way(problem, field))
-        return Reason(Status.NO_VALID_PATH, f"No path exists: {between}.", culprit)
+        between, location = _unknown_between(problem, field) or _narrow_between(problem, field, widest_way(problem, field))
+        return Diagnosis(Status.NO_VALID_PATH, f"No path exists: {between}.", location)
     return None
 
 
 def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str) -> tuple[str, Point | None]:
-    """What kept a search from finding a path, as the end of a sentence, and the culprit.
+    """What kept a search from finding a path, as the end of a sentence, and the location.
 
     Args:
         tree: what was grown.
@@ -93,7 +93,7 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str)
                 f"{_rounded_up(stuck[0])} m, the longest at {_at(stuck[1])}; move or turn the goal, or check turning_radius "
                 f"({radius:g} m)"), stuck[1]
     way = widest_way(problem, field)
-    if way is None or way.radius < problem.vehicle.inner_radius:
+    if way is None or way.radius < problem.vehicle.inscribed_radius:
         return _unknown_between(problem, field) or _narrow_between(problem, field, way)
     if len(tree) == 1:
         return f"no curve of the turning radius {radius:g} m left the start; set step_size, or allow more {more}", None
@@ -156,7 +156,7 @@ def _outside_message(problem: Problem, name: str, pose: Pose, tolerance: float, 
 
 def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, tolerance: float) -> tuple[str, Point]:
     """The sentence on a pose without room, and the nearest obstacle."""
-    need = problem.vehicle.inner_radius + MARGIN
+    need = problem.vehicle.inscribed_radius + MARGIN
     clearance = float(field.at(np.array(point)))
     nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, point, clearance)
     found, needed = _told_apart(clearance, need)
@@ -192,9 +192,9 @@ def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose)
 
 def _points_of(vehicle: Vehicle, pose: Pose) -> np.ndarray:
     """(n, 2) points all over the footprint at a pose, its corners among them; for a disc, its centre."""
-    if not vehicle.outline:
+    if not vehicle.footprint:
         return np.array([pose[:2]])
-    corners = np.array(vehicle.outline)
+    corners = np.array(vehicle.footprint)
     axes = [np.linspace(low, high, POINTS) for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)]
     lattice = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     inside = lattice[shapely.contains_xy(shapely.Polygon(corners), lattice)]
@@ -211,13 +211,13 @@ def _smaller(vehicle: Vehicle) -> str:
 
 def _parameter(vehicle: Vehicle) -> str:
     """What says how much room the vehicle takes."""
-    return "footprint" if vehicle.outline else "robot_radius"
+    return "footprint" if vehicle.footprint else "robot_radius"
 
 
 def _size(vehicle: Vehicle) -> str:
     """What takes room all around the reference point."""
-    if vehicle.outline:
-        return f"a footprint that is {2 * vehicle.inner_radius:.3g} m wide or more everywhere around its reference point"
+    if vehicle.footprint:
+        return f"a footprint that is {2 * vehicle.inscribed_radius:.3g} m wide or more everywhere around its reference point"
     return f"robot_radius {vehicle.robot_radius:g} m"
 
 
@@ -227,7 +227,7 @@ def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Poin
     if way is None:
         return None
     clearance = field.at(way.points)
-    first = int(np.argmax(clearance < problem.vehicle.inner_radius + MARGIN))
+    first = int(np.argmax(clearance < problem.vehicle.inscribed_radius + MARGIN))
     begins, _ = nearest_obstacle(problem.map, False, tuple(way.points[first].tolist()), float(clearance[first]))
     return (f"unknown space separates start and goal for {_size(problem.vehicle)}; on the way between them "
             f"it begins at {_at(begins)}; drive there to map it, or set allow_unknown"), begins
@@ -242,7 +242,7 @@ def _narrow_between(problem: Problem, field: ClearanceField, way: Way | None) ->
     vehicle, smaller = problem.vehicle, f"or {_smaller(problem.vehicle)}"
     if way and way.radius > MARGIN:
         radius = _rounded_down(way.radius - MARGIN)
-        lack = (f"{_size(vehicle)} does not fit" if vehicle.outline
+        lack = (f"{_size(vehicle)} does not fit" if vehicle.footprint
                 else f"with radius {radius} m instead of {vehicle.robot_radius:g} m they are connected")
         return (f"the widest way found between start and goal is {_metres(way.width)} m wide at {_at(way.narrowest)}; {lack}; "
                 f"check the map there, {smaller}"), way.narrowest
@@ -250,7 +250,7 @@ def _narrow_between(problem: Problem, field: ClearanceField, way: Way | None) ->
         walls = "walls or unknown space separate" if avoids_unknown(problem) else "walls separate"
         return f"{walls} start and goal, so that no {_parameter(vehicle)} is small enough; check the map", None
     width = _rounded_up(4 * lattice_spacing(problem.map, field))
-    need = f"{_size(vehicle)} does not fit" if vehicle.outline else f"robot_radius is {vehicle.robot_radius:g} m"
+    need = f"{_size(vehicle)} does not fit" if vehicle.footprint else f"robot_radius is {vehicle.robot_radius:g} m"
     return f"no way between start and goal is wider than {width} m, and {need}; check the map, {smaller}", None
 
 
@@ -264,7 +264,7 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
 
     A vehicle that faces a wall closer than its turning radius is told by this. Arcs are walked by the clearance found.
     """
-    need = problem.vehicle.inner_radius + MARGIN
+    need = problem.vehicle.inscribed_radius + MARGIN
     curvature = CURVATURES / problem.vehicle.turning_radius
     driven = np.zeros(len(curvature))
     for _ in range(MOST_STEPS):

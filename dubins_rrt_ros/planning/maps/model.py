@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..errors import PlanningError
 from ..text import one_line
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -21,7 +22,7 @@ FREE_UP_TO, OCCUPIED_FROM = 25, 65
 FINEST, FARTHEST = 1e-4, 1e8
 
 
-class MapError(ValueError):
+class MapError(PlanningError, ValueError):
     """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
 
     def __init__(self, message: str):

@@ -35,12 +35,12 @@ class DistanceField:
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "DistanceField":
         """The distances to where the goal is reached."""
-        return cls(field, problem.vehicle.inner_radius, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
+        return cls(field, problem.vehicle.inscribed_radius, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
 
     @classmethod
     def from_start(cls, problem: Problem, field: ClearanceField) -> "DistanceField":
         """The distances from the start."""
-        return cls(field, problem.vehicle.inner_radius, problem.start[:2])
+        return cls(field, problem.vehicle.inscribed_radius, problem.start[:2])
 
     def finish(self) -> None:
         """Find all distances now, so that several threads may ask for them."""

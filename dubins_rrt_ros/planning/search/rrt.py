@@ -238,7 +238,7 @@ class Search:
             self._take(self._portion())
             self._portion = None
         if not self._runs.exhausted:
-            expansions = EXPANSIONS_BESIDE_OF_POLYGON if self._problem.vehicle.outline else EXPANSIONS_BESIDE
+            expansions = EXPANSIONS_BESIDE_OF_POLYGON if self._problem.vehicle.footprint else EXPANSIONS_BESIDE
             self._portion = self._beside.start(self._runs.run, expansions, self.length)
 
     def _adopt(self, chain: Chain, end: int = -1) -> None:

@@ -63,7 +63,7 @@ class Sampler:
         kept, missing = [], count
         for _ in range(ROUNDS):
             drawn = self._corner + self._rng.random((count, 2)) @ self._sides
-            kept.append(drawn[self._field.may_be_free(drawn, self._problem.vehicle.inner_radius)][:missing])
+            kept.append(drawn[self._field.may_be_free(drawn, self._problem.vehicle.inscribed_radius)][:missing])
             missing -= len(kept[-1])
             if missing == 0:
                 break

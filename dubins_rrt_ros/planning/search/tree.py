@@ -10,11 +10,12 @@ from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
 from ..curves.dubins import WORDS, DubinsCurve
 from ..curves.path import Path
+from ..errors import PlanningError
 from ..problem import Pose
 from ..vehicle import Vehicle
 
 
-class TreeError(AssertionError):
+class TreeError(PlanningError, AssertionError):
     """A tree that breaks one of its invariants; the message says which and where."""
 
 
