@@ -15,8 +15,10 @@ from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_req
 from dubins_rrt_ros.planning.text import quoted
 
 from .bench.problems import read_json
-from .common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .common.example import ENDS, MAP
+from .common.flags import add_option_flags, given_options
 from .common.output import check_folder, finite, words_for, write_document
+from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.request import MAX_MAP_CELLS, read_map
 
 #: How far poses may be off by default [m, rad]: ample for four digits behind the point.
@@ -35,22 +37,21 @@ class Verdict(NamedTuple):
     audit: Audit
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "audit", usage="PATH.json MAP [options]", help="judge a path, whoever planned it",
-        argument_default=argparse.SUPPRESS,
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="PATH.json MAP [options]",
         description="Judges a path by code that shares nothing with the planner: whether a car can drive it, no tighter than "
                     "its turning radius, and whether all that the vehicle sweeps, between poses too, is clear of the obstacles.",
         notes="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
               "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
               "of constant curvature from each to the next, with the vehicle that the flags describe.",
-        examples=["dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --json plan.json",
-                  "dubins_rrt audit plan.json maze",
+        examples=[f"dubins_rrt plan {MAP} {ENDS} --json plan.json", f"dubins_rrt audit plan.json {MAP}",
                   "echo '[[1.5, 2, 1.5708], [1.5, 3, 1.5708], [1.5, 4, 1.5708]]' > theirs.json",
-                  "dubins_rrt audit theirs.json maze --turning-radius 1 --footprint "
+                  f"dubins_rrt audit theirs.json {MAP} --turning-radius 1 --footprint "
                   "'[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]'"],
         exit_status="0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage")
+    parser.argument_default = argparse.SUPPRESS
     parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
     parser.add_argument("map", metavar="MAP",
                         help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze")
@@ -63,7 +64,6 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
     _add_tolerances(parser.add_argument_group("poses"))
     for title, cls in (("vehicle", Vehicle), ("request", Problem)):
         add_option_flags(parser, title, cls)
-    parser.set_defaults(run=run)
 
 
 def _add_tolerances(group: argparse._ArgumentGroup) -> None:

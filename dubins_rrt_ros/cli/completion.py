@@ -7,13 +7,13 @@ imports. The names of maps alone are listed when they are asked for.
 import argparse
 import re
 import shlex
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
-from .common.flags import add_command
+from .commands import COMMANDS, load_arguments
+from .common.parser import Parser, describe
 
 #: What is completed where the help asks for these.
 _KINDS = {"MAP": "@map", "DIR": "@folder", "FILE": "@file", "PATH.json": "@file", "PROBLEMS.json": "@file"}
@@ -66,10 +66,10 @@ _ZSH = """\
 autoload -Uz bashcompinit && bashcompinit"""
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "completion", usage="bash|zsh|fish", help="let the tab key complete commands, flags and map names",
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="bash|zsh|fish",
         description="Prints a script that completes commands, flags with their choices, names of installed maps, and files. "
                     "The first example does so in this bash alone, the others in each that is started from now on.",
         notes="In zsh it is `source <(dubins_rrt completion zsh)`, in fish `dubins_rrt completion fish | source`.",
@@ -77,12 +77,12 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                   "dubins_rrt completion bash > ~/.local/share/bash-completion/completions/dubins_rrt"],
         exit_status="0 done, 2 wrong usage")
     parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
-    parser.set_defaults(run=partial(run, subparsers))
 
 
-def run(subparsers: argparse._SubParsersAction, arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Print the script."""
-    print("\n".join({"bash": _bash, "zsh": _zsh, "fish": _fish}[arguments.shell](subparsers)))
+    parsers = {name: load_arguments(name, Parser()) for name in COMMANDS}
+    print("\n".join({"bash": _bash, "zsh": _zsh, "fish": _fish}[arguments.shell](parsers)))
     return 0
 
 
@@ -120,29 +120,28 @@ def _list_maps() -> str:
     return f"command ls {shlex.quote(str(maps_directory()))} 2>/dev/null | sed -n 's/[.]yaml$//p; /[.]geojson$/p; /[.]wkt$/p'"
 
 
-def _bash(subparsers: argparse._SubParsersAction) -> Iterator[str]:
-    commands = subparsers.choices
+def _bash(parsers: Mapping[str, Parser]) -> Iterator[str]:
     places = (f"        {' | '.join(repr(f'{command} {name}') for name in place.names)}) "
               f"offer={shlex.quote(place.offer)} left={place.words} ;;"
-              for command, parser in commands.items() for place in _places(parser) if place.words)
-    flags = (f"        {command}) flags='{' '.join(_flags(parser))}' ;;" for command, parser in commands.items())
+              for command, parser in parsers.items() for place in _places(parser) if place.words)
+    flags = (f"        {command}) flags='{' '.join(_flags(parser))}' ;;" for command, parser in parsers.items())
     parts = {"PLACES": "\n".join(places), "FLAGS": "\n".join(flags), "MAPS": _list_maps(),
-             "COMMANDS": " ".join([*commands, "--help", "--version"])}
+             "COMMANDS": " ".join([*parsers, "--help", "--version"])}
     yield re.sub("|".join(parts), lambda match: parts[match[0]], _BASH)
 
 
-def _zsh(subparsers: argparse._SubParsersAction) -> Iterator[str]:
-    """The script of bash, which zsh can read."""
+def _zsh(parsers: Mapping[str, Parser]) -> Iterator[str]:
+    """Yield the script of bash, which zsh can read."""
     yield _ZSH
-    yield from _bash(subparsers)
+    yield from _bash(parsers)
 
 
-def _fish(subparsers: argparse._SubParsersAction) -> Iterator[str]:
+def _fish(parsers: Mapping[str, Parser]) -> Iterator[str]:
     yield "complete -c dubins_rrt -f"
-    for choice in subparsers._choices_actions:
-        yield f"complete -c dubins_rrt -n __fish_use_subcommand -a {choice.dest} -d {_fish_quoted(choice.help)}"
-    for command, parser in subparsers.choices.items():
-        condition = f"complete -c dubins_rrt -n '__fish_seen_subcommand_from {command}'"
+    for name, command in COMMANDS.items():
+        yield f"complete -c dubins_rrt -n __fish_use_subcommand -a {name} -d {_fish_quoted(command.help)}"
+    for name, parser in parsers.items():
+        condition = f"complete -c dubins_rrt -n '__fish_seen_subcommand_from {name}'"
         for place in _places(parser):
             flags = "".join(f" -l {name[2:]}" for name in place.names if name.startswith("--"))
             help = f" -d {_fish_quoted(place.help)}" if flags else ""

@@ -1,15 +1,14 @@
-"""The command `dubins_rrt`: each subcommand lives in the file of its name."""
+"""The entry of `dubins_rrt`: it runs the command that was asked for, and turns an error into one line and an exit status."""
 
 import contextlib
 import os
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from dubins_rrt_ros import __version__
-
 if TYPE_CHECKING:
-    from .common.flags import Parser
+    from argparse import Namespace
 
 SUCCESS, NO_PATH, WRONG_USAGE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 
@@ -23,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     name = " ".join(["dubins_rrt", *words[:1]])
     try:
-        with _output_written():
+        with _warnings_in_one_line(name), _output_written():
             return _run(words)
     except BrokenPipeError:
         return PIPE_CLOSED
@@ -32,6 +31,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+@contextlib.contextmanager
+def _warnings_in_one_line(name: str) -> Iterator[None]:
+    """Print warnings, such as that of interpreted kernels, as errors are printed: without the place in the source."""
+    before = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"{name}: warning: {message}\n"
+    try:
+        yield
+    finally:
+        warnings.formatwarning = before
 
 
 @contextlib.contextmanager
@@ -48,16 +58,21 @@ def _output_written() -> Iterator[None]:
 
 
 def _run(words: Sequence[str]) -> int:
-    # Imported here, for it takes a second, in which Ctrl-C shall not print a trace either.
-    from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
-    from dubins_rrt_ros.planning.plan_file import PlanFileError
-
-    from .common.flags import UsageError, guard_numbers
-    parser = _parser()
+    # The imports are here since they take a moment, in which Ctrl-C must not print a trace either.
+    from .commands import make_parser
+    from .common.parser import guard_numbers
+    parser = make_parser(wanted=words[:1])
     if not words:
         parser.print_help(sys.stderr)
         return WRONG_USAGE
-    arguments = parser.parse_args(guard_numbers(words))
+    return _run_command(parser.parse_args(guard_numbers(words)))
+
+
+def _run_command(arguments: "Namespace") -> int:
+    from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, Status
+    from dubins_rrt_ros.planning.plan_file import PlanFileError
+
+    from .common.parser import UsageError
     try:
         return arguments.run(arguments)
     except InvalidPose as error:
@@ -65,26 +80,6 @@ def _run(words: Sequence[str]) -> int:
         return NO_PATH
     except (UsageError, OptionError, MapError, PlanFileError) as error:
         return _refused(f"dubins_rrt {arguments.command}", str(error))
-
-
-def _parser() -> "Parser":
-    from dubins_rrt_ros.evaluation.campaign import command as campaign
-    from dubins_rrt_ros.evaluation.figures import command as figures
-    from dubins_rrt_ros.evaluation.paper import command as paper
-
-    from . import audit, completion, plan, render
-    from .bench import command as bench
-    from .common.flags import Parser, section
-    from .demo import command as demo
-    start = section("quick start", *plan.EXAMPLES[:1], "dubins_rrt plan --help")
-    status = section("exit status", "0 done, 1 no path or a wrong one, 2 wrong usage, 130 interrupted")
-    parser = Parser(prog="dubins_rrt", epilog=f"{start}\n\n{status}",
-                    description="Plans paths for a vehicle that drives forward and cannot turn on the spot.")
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", title="commands")
-    for command in (plan, audit, bench, campaign, demo, figures, paper, render, completion):
-        command.add_to(subparsers)
-    return parser
 
 
 def _refused(name: str, reason: str) -> int:

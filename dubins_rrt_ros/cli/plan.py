@@ -9,19 +9,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from tqdm import tqdm
-
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
 
-from .common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from .common.example import ENDS, EXAMPLE, MAP
+from .common.flags import add_option_flags, given_options
 from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
+from .common.parser import Parser, UsageError, add_json_flag, describe
+from .common.progress import progress_bar
 from .common.request import MAX_MAP_CELLS, Request, read_map, read_replay
-
-EXAMPLES = ("dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --plot maze.png",
-            "dubins_rrt plan maze --start 1.5 2 1.57 --goal 13.5 10.5 1.57 --planner rrt --json plan.json",
-            "dubins_rrt plan --replay plan.json",
-            "dubins_rrt plan parking.geojson --start 2.5 8.75 0 --goal 22 4.1 -1.5708 --turning-radius 5 \\",
-            "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'")
 
 
 class _Replay(argparse.Action):
@@ -37,13 +32,16 @@ class _Replay(argparse.Action):
             action.required = False
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(subparsers, "plan", usage="MAP --start X Y YAW --goal X Y YAW [options]", help="plan a path on a map",
-                         description="Plans a path on a map, prints its figures and writes it to files.", examples=EXAMPLES,
-                         notes="The first Ctrl-C ends the search with the best path so far.",
-                         exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, "
-                                     "130 interrupted")
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="MAP --start X Y YAW --goal X Y YAW [options]",
+        description="Plans a path on a map, prints its figures and writes it to files.",
+        examples=[EXAMPLE, f"dubins_rrt plan {MAP} {ENDS} --planner rrt --json plan.json", "dubins_rrt plan --replay plan.json",
+                  "dubins_rrt plan parking.geojson --start 2.5 8.75 0 --goal 22 4.1 -1.5708 --turning-radius 5 \\",
+                  "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'"],
+        notes="The first Ctrl-C ends the search with the best path so far.",
+        exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, 130 interrupted")
     pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW"), "required": True, "default": argparse.SUPPRESS}
     request = (parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
                                    help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze"),
@@ -59,7 +57,6 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                              "its seed and as many samples as it drew, and no time limit, so that the path is the same")
     for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
         add_option_flags(parser, title, cls)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -67,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.json, arguments.csv, arguments.plot)
     check_drawing(arguments.plot)
     request = _request(arguments)
-    with _interrupt() as cancel, _progress_bar(request.settings) as on_progress:
+    with _interrupt() as cancel, _shown_progress(request.settings) as on_progress:
         answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
     answer = replace(answer, map_time=answer.map_time + request.load_time)
     _report(answer, request, words_for(arguments.json))
@@ -109,14 +106,13 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
 
 
 @contextlib.contextmanager
-def _progress_bar(settings: Settings) -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal, with the best length and the time limit; nothing elsewhere."""
+def _shown_progress(settings: Settings) -> Iterator[Callable[[Progress], None]]:
+    """Show on a terminal how many samples are drawn, with the best length and the time limit."""
     limit = f"limit {settings.planning_time:g} s"
-    with tqdm(total=settings.samples, unit=" samples", file=sys.stderr, disable=None, leave=False, postfix=limit) as bar:
+    with progress_bar(settings.samples, " samples", limit) as move:
         def show(progress: Progress) -> None:
             best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
-            bar.set_postfix_str(f"{best}, {limit}", refresh=False)
-            bar.update(progress.samples - bar.n)
+            move(progress.samples, f"{best}, {limit}")
 
         yield show
 

@@ -6,22 +6,22 @@ from pathlib import Path
 
 from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
 
-from .common.flags import UsageError, add_command, add_json_flag
+from .common.example import ENDS, MAP
 from .common.output import check_folder, words_for, write_document
+from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.request import find_map
 
 #: Each cell is a polygon while it is judged, a few hundred bytes.
 MAX_CELLS = 4_000_000
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "render", usage="MAP [options]", help="make a map_server pair of a polygon map",
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="MAP [options]",
         description="Makes the grid of a polygon map and writes it as map_server's YAML and image. A cell is occupied "
                     "where it meets an obstacle, be it with a corner.",
-        examples=["dubins_rrt render maze.geojson --resolution 0.1 --out grids", "dubins_rrt plan grids/maze.yaml "
-                  "--start 1.5 2 1.57 --goal 13.5 10.5 1.57"],
+        examples=[f"dubins_rrt render {MAP}.geojson --resolution 0.1 --out grids", f"dubins_rrt plan grids/{MAP}.yaml {ENDS}"],
         exit_status="0 done, 2 wrong usage")
     parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt), or an installed one's name")
     parser.add_argument("--resolution", metavar="m", type=float, default=0.05,
@@ -29,7 +29,6 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument("--out", metavar="DIR", help="where to write; by default beside the polygon map, and the pair of an "
                                                      "installed one here")
     add_json_flag(parser, "the files' names, and the grid's measures,")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

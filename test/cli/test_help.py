@@ -13,7 +13,8 @@ import pytest
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli import main as program
-from dubins_rrt_ros.cli.common.flags import guard_numbers
+from dubins_rrt_ros.cli.commands import make_parser
+from dubins_rrt_ros.cli.common.parser import guard_numbers
 
 COMMANDS = ["plan", "audit", "bench", "campaign", "completion", "demo", "figures", "paper", "render"]
 ENDS = ["--start", "1.5", "2", "1.57", "--goal", "13.5", "10.5", "1.57"]
@@ -63,12 +64,20 @@ def test_no_command_shows_the_help_with_a_quick_start(capsys):
     assert all(f"\n    {command}" in error for command in COMMANDS)
 
 
+@pytest.mark.parametrize("flag", ["--help", "--version"])
+def test_the_list_of_commands_needs_none_of_what_they_import(flag):
+    words = ("import sys; sys.modules |= dict.fromkeys(['numpy', 'scipy']); "
+             f"from dubins_rrt_ros.cli.main import main; main(['{flag}'])")
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and done.stdout.startswith(("usage: dubins_rrt", "dubins_rrt ")) and done.stderr == ""
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_examples_that_are_understood_and_tells_the_exit_status(command):
     lines = "\n".join(examples(command)).replace("\\\n", "").splitlines()
     mine = [shlex.split(line)[1:] for line in lines if f"{line} ".startswith(f"dubins_rrt {command} ")]
     for words in mine:
-        arguments = program._parser().parse_args(guard_numbers(words[:words.index(">")] if ">" in words else words))
+        arguments = make_parser([command]).parse_args(guard_numbers(words[:words.index(">")] if ">" in words else words))
         assert arguments.command == command
     assert mine and re.search(r"^exit status:\n  0 .*2 wrong usage", help_of(command), re.MULTILINE)
 

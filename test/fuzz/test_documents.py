@@ -9,7 +9,7 @@ from support.bounded import read_or_refused
 from support.mutations import json_of, spoiled_documents
 
 from dubins_rrt_ros.cli.bench.problems import Case, read_cases
-from dubins_rrt_ros.cli.common.flags import UsageError
+from dubins_rrt_ros.cli.common.parser import UsageError
 from dubins_rrt_ros.cli.common.request import read_replay
 from dubins_rrt_ros.planning import InvalidPose, MapError, OptionError, PolygonMap, Problem, Settings, Vehicle, options, values
 from dubins_rrt_ros.planning.curves.path import Path

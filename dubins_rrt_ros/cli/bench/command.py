@@ -11,8 +11,9 @@ from typing import Any
 from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.option import option
 
-from ..common.flags import UsageError, add_command, add_json_flag, add_option_flags, given_options
+from ..common.flags import add_option_flags, given_options
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
+from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
 from .problems import chosen, read_cases
 from .records import Best, Runs, best_known, grouped, read_best_known, read_runs, run_of
@@ -35,11 +36,10 @@ class _Flags(Settings):
     seed: int = 0
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "bench", usage="(PROBLEMS.json --out FILE | --report FILE [FILE ...]) [options]",
-        help="measure the planner on a file of problems, and compare", argument_default=argparse.SUPPRESS,
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="(PROBLEMS.json --out FILE | --report FILE [FILE ...]) [options]",
         description="Plans every problem of a file with several seeds and writes a line of JSON for each run, as soon as it is "
                     "done; or, with --report, compares the runs in such files.",
         notes="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
@@ -51,13 +51,13 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                   "dubins_rrt bench problems.json --samples 1000 --seeds 3 --no-informed --label plain --out plain.jsonl",
                   "dubins_rrt bench --report ours.jsonl plain.jsonl --plot report.png"],
         exit_status="0 all runs solved or a report, 1 some run unsolved, 2 wrong usage, 130 interrupted")
+    parser.argument_default = argparse.SUPPRESS
     parser.add_argument("--out", metavar="FILE", help="where to write: the lines of JSON; with --report the report as Markdown, "
                                                       "which goes to standard output otherwise")
     add_json_flag(parser, "what the runs amount to")
     _add_measuring(parser.add_argument_group("measuring"))
     add_option_flags(parser, "settings", _Flags)
     _add_report(parser.add_argument_group("report"))
-    parser.set_defaults(run=run)
 
 
 def _add_measuring(group: argparse._ArgumentGroup) -> None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..common.flags import UsageError
+from ..common.parser import UsageError
 from ..common.plots import CULPRIT, DPI, GOAL, PATH, START
 from .records import Best, Run, Runs
 from .report import quantile, ratio

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Vehicle, checked_pose
 from dubins_rrt_ros.planning.text import one_line, quoted
 
-from ..common.flags import UsageError
+from ..common.parser import UsageError
 
 KEYS = ("name", "map", "start", "goal", "turning_radius", "robot_radius")
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from ..common.flags import UsageError
+from ..common.parser import UsageError
 from .problems import read_json, read_text
 
 

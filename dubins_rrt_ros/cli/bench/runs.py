@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, World, load_map, plan, prepare
 
-from ..common.flags import UsageError
+from ..common.parser import UsageError
 from .problems import Case
 
 #: The poses of a path are this far apart [m], or this share of a cell where that is more: on cells of a metre a quarter of one

@@ -1,98 +1,10 @@
-"""The library's options as command line flags, and an argument parser whose errors take one line."""
+"""The library's options as flags of the command line."""
 
 import argparse
-import difflib
-from collections.abc import Iterable, Sequence
-from itertools import takewhile
-from typing import Any, NoReturn
+from typing import Any
 
 from dubins_rrt_ros.planning import options
 from dubins_rrt_ros.planning.option import Option
-
-
-class UsageError(Exception):
-    """The command was used wrongly; the message says how and what to do instead."""
-
-
-def near_miss(word: str, known: Iterable[str]) -> str:
-    """The end of a sentence on a word that is not known: what it begins or may be a slip of, if anything."""
-    known = list(known)
-    near = [name for name in known if name.startswith(word)] or difflib.get_close_matches(word, known)
-    return f"; did you mean {near[0]}?" if near else ""
-
-
-class _Formatter(argparse.HelpFormatter):
-    """Fills paragraphs, but leaves those alone that have indented lines: examples are printed as they are run."""
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        fill = super()._fill_text
-        return "\n\n".join(part if "\n  " in part else fill(part, width, indent) for part in text.split("\n\n"))
-
-
-class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors take one line and suggest what was meant; it knows flags by their full names only."""
-
-    def __init__(self, **keywords: Any):
-        super().__init__(allow_abbrev=False, formatter_class=_Formatter, **keywords)
-
-    def error(self, message: str) -> NoReturn:
-        """End the process with status 2."""
-        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
-
-    def parse_known_args(self, args: Sequence[str], namespace: argparse.Namespace | None = None
-                         ) -> tuple[argparse.Namespace, list[str]]:
-        """As ever, but nothing is left over: a flag that is not known is named before those that are missing for it."""
-        own = takewhile(_is_flag, args) if self._subparsers else filter(_is_flag, args)  # after a command come its flags
-        for flag in (word.split("=")[0] for word in own):
-            if flag not in self._option_string_actions:
-                self.error(f"there is no flag {flag}{near_miss(flag, self._option_string_actions)}")
-        namespace, extras = super().parse_known_args(args, namespace)
-        if extras:
-            self.error(f"{extras[0].strip()} is one argument too many")
-        return namespace, extras
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        if action.choices is not None and value not in action.choices:
-            remedy = near_miss(value, action.choices) or f"; give one of {', '.join(action.choices)}"
-            raise argparse.ArgumentError(action, f"{value} is unknown{remedy}")
-
-
-def _is_flag(word: str) -> bool:
-    return word.startswith("-") and word not in ("-", "--")
-
-
-def add_command(subparsers: argparse._SubParsersAction, name: str, *, usage: str, examples: Sequence[str], exit_status: str,
-                notes: str = "", **keywords: Any) -> Parser:
-    """Add a command whose help ends with notes, examples that run as they are printed, and the exit status."""
-    return subparsers.add_parser(name, usage=f"%(prog)s {usage}", **keywords,
-                                 epilog=f"{notes}\n\n{section('examples', *examples)}\n\n{section('exit status', exit_status)}")
-
-
-def section(title: str, *lines: str) -> str:
-    """A part of a help text whose lines stay as they are."""
-    return "\n".join([f"{title}:", *(f"  {line}" for line in lines)])
-
-
-def add_json_flag(parser: argparse.ArgumentParser, what: str) -> None:
-    """Give `parser` the flag --json; where it is not given its value is None."""
-    parser.add_argument("--json", metavar="FILE", default=None,
-                        help=f"write {what} as JSON; - is standard output, where nothing else goes then")
-
-
-def guard_numbers(argv: list[str]) -> list[str]:
-    """`argv` with a blank in front of every negative number, so that argparse takes none for a flag.
-
-    It knows -1 and -0.5 as numbers by itself, but not -1e-3 nor -inf. The blank is lost again in float().
-    """
-    return [" " + word if word.startswith("-") and _is_number(word) else word for word in argv]
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type) -> None:

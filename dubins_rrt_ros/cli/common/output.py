@@ -10,7 +10,7 @@ from typing import Any, TextIO
 from dubins_rrt_ros.planning import Plan
 from dubins_rrt_ros.planning.plan_file import to_document
 
-from .flags import UsageError
+from .parser import UsageError
 
 STDOUT = "-"
 DRAWINGS = (".png", ".svg", ".pdf")

@@ -13,7 +13,7 @@ from dubins_rrt_ros.planning.maps.locate import find_map as locate_map
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 
-from .flags import near_miss
+from .parser import near_miss
 
 MAX_MAP_CELLS = 100_000_000
 

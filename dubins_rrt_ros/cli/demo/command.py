@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import importlib.util
-import math
 import os
 import signal
 import sys
@@ -15,30 +14,29 @@ from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
-from ..common.flags import add_command, add_json_flag
+from ..common.example import GOAL, MAP, START
 from ..common.output import check_drawing, check_folder, words_for, write_document
+from ..common.parser import Parser, add_json_flag, describe
 from .process import DemoError, PlannerProcess
 
 if TYPE_CHECKING:
     from .client import Answer
 
-START, GOAL = (1.5, 2.0, math.pi / 2), (13.5, 10.5, math.pi / 2)
 PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000,
               "planning_time": 2.0, "seed": 1}
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(subparsers, "demo", usage="[options]", help="see the ROS node plan in the maze",
-                         description="Starts the node on the installed maze, sends it a start and a goal over real topics, "
-                                     "receives the path, draws it and stops the node.",
-                         examples=["dubins_rrt demo", "dubins_rrt demo --plot maze.svg --json demo.json"],
-                         exit_status="0 a path was received, 1 none: the reason is on standard error, 2 wrong usage, "
-                                     "130 interrupted")
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="[options]",
+        description="Starts the node on the installed maze, sends it a start and a goal over real topics, "
+                    "receives the path, draws it and stops the node.",
+        examples=["dubins_rrt demo", "dubins_rrt demo --plot maze.svg --json demo.json"],
+        exit_status="0 a path was received, 1 none: the reason is on standard error, 2 wrong usage, 130 interrupted")
     parser.add_argument("--plot", metavar="FILE", default="demo.png",
                         help="the picture (.png, .svg, .pdf); default demo.png")
     add_json_flag(parser, "what was received")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -81,7 +79,7 @@ def _planner() -> Iterator[PlannerProcess]:
     # SIGTERM ends this process as Ctrl-C does, so that it leaves no node behind.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / "maze.yaml"}, log)
+        planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / f"{MAP}.yaml"}, log)
         try:
             yield planner
         finally:

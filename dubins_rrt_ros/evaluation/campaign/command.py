@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from dubins_rrt_ros import __version__
-from dubins_rrt_ros.cli.common.flags import UsageError, add_command, add_json_flag
 from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
+from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
 from .judge import Task, judged
@@ -26,10 +26,10 @@ _COLUMNS = {"path": ("NONE",), "no path": ("NO_VALID_PATH",), "occupied": ("STAR
 _KNOWN = {True: ", passes", False: ", does not pass", None: ""}
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "campaign", usage="[options]", help="try to prove the planner wrong with random problems",
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="[options]",
         description="Plans random problems - grids of many resolutions, polygons, mazes, gaps that just pass and that just fail, "
                     "starts and goals that touch obstacles, discs and polygons as vehicles, all planners and samplers - and "
                     "judges each answer by the audit: the path, all edges of the tree, and what the status claims.",
@@ -45,7 +45,6 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
                              "default 1, this process")
     parser.add_argument("--out", metavar="FILE", help="write a line of JSON for each problem")
     add_json_flag(parser, "the counts, and all disagreements,")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

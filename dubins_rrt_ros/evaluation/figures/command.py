@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dubins_rrt_ros.cli.common.flags import add_command, add_json_flag
 from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
+from dubins_rrt_ros.cli.common.parser import Parser, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
 if TYPE_CHECKING:
@@ -17,17 +17,16 @@ FOLDER = "docs/figures"
 FORMATS = {".svg": 110, ".png": 160}
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "figures", usage="[options]", help="draw the figures of the documentation",
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="[options]",
         description="Draws every figure of docs/ as .svg and .png: what they show is computed by the planner itself, so they "
                     "are right for this version.",
         notes="Drawn again by the same versions of this package and matplotlib, the files are the same to the byte.",
         examples=["dubins_rrt figures --out figures"], exit_status="0 done, 2 wrong usage, 130 interrupted")
     parser.add_argument("--out", metavar="DIR", default=FOLDER, help=f"where to write; default {FOLDER}")
     add_json_flag(parser, "the files' names")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,14 +4,12 @@ import argparse
 import contextlib
 import json
 import os
-import sys
 import time
 from pathlib import Path
 
-from dubins_rrt_ros.cli.common.flags import UsageError, add_command, add_json_flag
 from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, write_document
+from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
-from dubins_rrt_ros.planning import kernels_compiled
 
 from .runs import Measured, all_runs, outcomes
 
@@ -19,10 +17,10 @@ SEEDS = 30
 REPORT, LINES = "report.md", "runs.jsonl"
 
 
-def add_to(subparsers: argparse._SubParsersAction) -> None:
-    """Add the command."""
-    parser = add_command(
-        subparsers, "paper", usage="[options]", help="measure again what the paper measured",
+def add_arguments(parser: Parser) -> None:
+    """Give the parser the flags and the help of the command."""
+    describe(
+        parser, usage="[options]",
         description="Runs what the paper ran - RRT and RRT* in block, maze and forest, and its table of the maze - over many "
                     "seeds, and answers its open question: what if steps have no limit, and headings point towards the goal? "
                     f"Writes {REPORT} with tables and figures (.png and .svg), and {LINES}, a line of JSON for each run.",
@@ -35,7 +33,6 @@ def add_to(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument("--jobs", metavar="J", type=int, default=os.cpu_count() or 1,
                         help="run in J processes; default as many as there are cores")
     add_json_flag(parser, "the report's tables and its answer")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -43,9 +40,6 @@ def run(arguments: argparse.Namespace) -> int:
     for name in ("seeds", "jobs"):
         if getattr(arguments, name) < 1:
             raise UsageError(f"--{name} is {getattr(arguments, name)}; give 1 or more")
-    if not kernels_compiled:
-        print("dubins_rrt paper: the kernels are not compiled, so this takes hours; install a C compiler and the package again",
-              file=sys.stderr)
     check_folder(arguments.json)
     folder, begin = Path(arguments.out), time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from itertools import product
 from typing import NamedTuple
 
 from dubins_rrt_ros.cli.bench.report import median
-from dubins_rrt_ros.cli.common.flags import UsageError
+from dubins_rrt_ros.cli.common.parser import UsageError
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, load_map, plan, prepare
 from dubins_rrt_ros.planning.maps.locate import find_map
 

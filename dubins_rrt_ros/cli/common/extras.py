@@ -1,0 +1,20 @@
+"""Packages that an installation may lack, for they come with an extra: `pip install 'dubins_rrt_ros[plots]'`."""
+
+from importlib.util import find_spec
+
+from .parser import UsageError
+
+
+def require_matplotlib(extra: str = "plots") -> None:
+    """Refuse to draw where there is nothing to draw with; to be called before the work, so that none is lost for it.
+
+    Raises:
+        UsageError: matplotlib is not installed; the message names the extra that installs it.
+    """
+    if find_spec("matplotlib") is None:
+        raise UsageError(f"it draws with matplotlib, which is not installed; run: {install_command(extra)}")
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra."""
+    return f"pip install 'dubins_rrt_ros[{extra}]'"
