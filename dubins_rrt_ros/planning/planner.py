@@ -14,11 +14,11 @@ from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .curves.path import Path
 from .diagnosis import explain
-from .diagnosis.bounds import lower_bound
 from .problem import Problem
 from .result import Plan, Progress, Status, gap_above
 from .search.cost_to_go import DistanceField
 from .search.headings import FOLLOW_FIELD
+from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
 from .settings import Settings

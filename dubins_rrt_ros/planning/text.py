@@ -1,5 +1,6 @@
 """What messages say of values: short, on one line, and in characters that any terminal can show."""
 
+import math
 import reprlib
 from typing import Any
 
@@ -21,6 +22,42 @@ def quoted(value: Any) -> str:
     """`value` as Python writes it, of a long or deep one only the beginning."""
     text = _SHORT.repr(value)
     return text if len(text) <= _MOST_QUOTED else f"{text[:_MOST_QUOTED]}..."
+
+
+def at(point: tuple[float, float]) -> str:
+    """Return a position (x, y) [m] with two decimals."""
+    x, y = (round(coordinate, 2) + 0.0 for coordinate in point)  # no -0.00
+    return f"({x:.2f}, {y:.2f})"
+
+
+def metres(value: float) -> str:
+    """Return two decimals, or two significant digits where that is more; three digits of what is too far to imagine."""
+    if value >= 1e7:
+        return f"{value:.3g}"
+    return f"{value:.2f}" if value >= 0.1 or value == 0 else f"{value:.2g}"
+
+
+def rounded_down(value: float) -> str:
+    """Return a number that is not above `value`, with the digits of `metres`."""
+    digits = _decimals(value)
+    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
+
+
+def rounded_up(value: float) -> str:
+    """Return a number that is not below `value`, with the digits of `metres`."""
+    digits = _decimals(value)
+    return f"{math.ceil(value * 10**digits) / 10**digits:.{digits}f}"
+
+
+def _decimals(value: float) -> int:
+    """Return the number of decimals that show two significant digits; two at least."""
+    return max(2, 1 - math.floor(math.log10(value))) if value > 0 else 2
+
+
+def distinct(*values: float) -> tuple[str, ...]:
+    """Return figures with two decimals, or with as many as make them differ."""
+    digits = next(n for n in range(2, 17) if len({f"{value:.{n}f}" for value in values}) == len(values) or n == 16)
+    return tuple(f"{value:.{digits}f}" for value in values)
 
 
 class _Short(reprlib.Repr):

@@ -22,8 +22,8 @@ from support.cases import (
 from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, plan
 from dubins_rrt_ros.planning.collision import clearance
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.diagnosis.bounds import lower_bound
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 MAPS = {
     "boxes": boxes_grid, "crowded": lambda rng: boxes_grid(rng, boxes=40), "maze": maze_grid,

@@ -21,12 +21,12 @@ from support.cases import (
 )
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
-from dubins_rrt_ros.planning.diagnosis.bounds import lower_bound
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.planning.search import background as beside
 from dubins_rrt_ros.planning.search import rrt
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 BUDGETS = (1, 7, rrt.BLOCK - 1, rrt.BLOCK, rrt.BLOCK + 1, 1100, 3000) if SCALE == 1 else (1, 7, 20, 40)
 KINDS = ["maze", "polygons", "late", "brief"] if SCALE == 1 else ["maze"]

@@ -31,8 +31,8 @@ from dubins_rrt_ros.cli.common.plots import (
     planner_title,
 )
 from dubins_rrt_ros.planning import ClearanceField, Plan, Problem, Progress, Settings, plan
-from dubins_rrt_ros.planning.diagnosis.bounds import lower_bound
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 from ..paper.runs import MAZE, MOST, NO_LIMIT, UNLIMITED, Run, planned, problem_in
 

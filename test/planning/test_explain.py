@@ -21,9 +21,9 @@ from dubins_rrt_ros.planning import (
     kernels_compiled,
     plan,
 )
-from dubins_rrt_ros.planning.diagnosis import bounds as bounds_module
-from dubins_rrt_ros.planning.diagnosis.bounds import has_no_room, lattice_spacing, nearest_in_map
-from dubins_rrt_ros.planning.diagnosis.explain import nearest_obstacle
+from dubins_rrt_ros.planning.diagnosis import widest_passage as passage_module
+from dubins_rrt_ros.planning.diagnosis.obstacles import has_no_room, nearest_in_map, nearest_obstacle
+from dubins_rrt_ros.planning.diagnosis.widest_passage import sample_spacing
 
 START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
 TURNED = (3.0, -2.0, 0.7)
@@ -74,7 +74,7 @@ def test_too_narrow_a_gap_in_polygons_is_measured(gap):
     walls = shapely.union(shapely.box(-0.5, -11, 0.5, 3), shapely.box(-0.5, 3 + gap, 0.5, 11))
     problem = Problem(PolygonMap(shapely.box(-10, -10, 10, 10) - walls), Vehicle(0.5, 0.9), START, GOAL)
     result = why(problem)
-    spacing = lattice_spacing(problem.map, ClearanceField(problem.map))
+    spacing = sample_spacing(problem.map, ClearanceField(problem.map))
     width, radius = map(float, re.search(r"is ([\d.]+) m wide .* radius ([\d.]+) m instead of 0.9 m", result.message).groups())
     assert gap - 2 * spacing < width <= gap + 0.005
     assert (width - spacing) / 2 - 0.02 < radius < gap / 2
@@ -102,12 +102,12 @@ def test_a_gap_too_narrow_to_be_proved_is_named_after_the_search():
     assert "0.40 m wide at (0.00, 0.20)" in result.message
 
 
-def test_a_gap_narrower_than_the_lattice_is_bounded():
+def test_a_gap_narrower_than_the_samples_is_bounded():
     walls = shapely.union(shapely.box(-0.5, -11, 0.5, 3), shapely.box(-0.5, 3.001, 0.5, 11))
     problem = Problem(PolygonMap(shapely.box(-10, -10, 10, 10) - walls), Vehicle(0.5, 0.3), START, GOAL)
     result = why(problem)
     width = float(re.search(r"no way between start and goal is wider than ([\d.]+) m, and robot_radius is", result.message)[1])
-    assert 4 * lattice_spacing(problem.map, ClearanceField(problem.map)) <= width < 1
+    assert 4 * sample_spacing(problem.map, ClearanceField(problem.map)) <= width < 1
     assert not are_connected(problem, width / 2)
     assert result.location is None
 
@@ -163,15 +163,15 @@ def test_unknown_space_is_not_blamed_for_walls():
 
 
 def test_large_grids_are_coarsened_to_the_safe_side(monkeypatch):
-    monkeypatch.setattr(bounds_module, "MOST_CELLS", 300)
-    monkeypatch.setattr(bounds_module, "MOST_NODES", 2000)
+    monkeypatch.setattr(passage_module, "MAX_CELLS", 300)
+    monkeypatch.setattr(passage_module, "MAX_NODES", 2000)
     problem = Problem(walls_with_a_gap(slice(0, 0), -1, 0.25), Vehicle(0.5, 0.2), START, GOAL)
     assert "unknown space separates start and goal" in why(problem).message
     problem = Problem(walls_with_a_gap(slice(30, 36), resolution=0.25), Vehicle(0.5, 1.5), START, GOAL)
     radius = float(re.search(r"with radius ([\d.]+) m instead", why(problem).message)[1])
     assert 0.3 < radius < 0.75
     grid = boxes_grid(np.random.default_rng(3), unknown=True)
-    coarse = bounds_module._coarsened(grid, 4)
+    coarse = passage_module._coarsened(grid, 4)
     assert coarse.data.shape == (10, 12)
     points = np.random.default_rng(4).uniform(grid.corners().min(axis=0), grid.corners().max(axis=0), (2000, 2))
     for allow_unknown in (False, True):

@@ -1,4 +1,4 @@
-"""The widest way between two places: the flood against brute force, and what is said of ways against shapely."""
+"""The widest passage between two places: the search against brute force, and what is said of passages against shapely."""
 
 import math
 import re
@@ -14,12 +14,13 @@ from support.naive import are_connected, free_space
 from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
 from dubins_rrt_ros.planning._kernels.widest_path import WidestPathSearch
 from dubins_rrt_ros.planning.collision.clearance import MARGIN
-from dubins_rrt_ros.planning.diagnosis.bounds import are_separated, lattice_spacing, widest_way
+from dubins_rrt_ros.planning.diagnosis.components import are_separated
 from dubins_rrt_ros.planning.diagnosis.explain import before_search
+from dubins_rrt_ros.planning.diagnosis.widest_passage import sample_spacing, widest_passage
 
 
 @pytest.mark.parametrize("seed", range(scaled(30, least=6)))
-def test_the_flood_finds_the_widest_way(seed):
+def test_the_search_finds_the_widest_passage(seed):
     rng = np.random.default_rng(seed)
     map = boxes_grid(rng, side=int(rng.integers(3, 12)), boxes=int(rng.integers(0, 14)))
     shape = tuple(rng.integers(2, 16, 2).tolist())
@@ -35,12 +36,12 @@ def test_the_flood_finds_the_widest_way(seed):
     is_target[tuple(np.transpose(targets))] = 1
     search = WidestPathSearch(ClearanceField(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least,
                               enough)
-    found, way = search.widest_path(start[0] * shape[1] + start[1])
+    found, passage = search.widest_path(start[0] * shape[1] + start[1])
     assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
     if found == 0:
-        assert len(way) == 0
+        assert len(passage) == 0
         return
-    rows, columns = np.divmod(way, shape[1])
+    rows, columns = np.divmod(passage, shape[1])
     assert (rows[0], columns[0]) == start
     assert (rows[-1], columns[-1]) in targets
     assert (np.abs(np.diff(rows)) + np.abs(np.diff(columns)) == 1).all()
@@ -61,24 +62,24 @@ def crowded_problem(rng):
 
 
 @pytest.mark.slow
-def test_the_widest_way_is_as_wide_as_it_says_and_hardly_narrower_than_any():
+def test_the_widest_passage_is_as_wide_as_it_says_and_hardly_narrower_than_any():
     """By shapely, on grids and polygons: what is left of the free space when its edge is moved inwards."""
     rng = np.random.default_rng(5)
     narrow = 0
     for _ in range(40 if SCALE == 1 else 8):
         problem = crowded_problem(rng)
         field = ClearanceField(problem.map)
-        spacing = lattice_spacing(problem.map, field)
-        way = widest_way(problem, field)
-        if way is None:
+        spacing = sample_spacing(problem.map, field)
+        passage = widest_passage(problem, field)
+        if passage is None:
             assert not are_connected(problem, 2 * spacing)
             continue
-        assert are_connected(problem, (1 - 1e-4) * way.radius)
-        assert field.at(way.points).min() >= way.radius
-        assert tuple(way.points[0]) == problem.start[:2]
-        assert math.dist(way.points[-1], problem.goal[:2]) <= problem.goal_tolerance_xy + 1e-9
-        if way.radius < problem.vehicle.robot_radius:
-            assert not are_connected(problem, way.radius + 3 * spacing)
+        assert are_connected(problem, (1 - 1e-4) * passage.radius)
+        assert field.at(passage.points).min() >= passage.radius
+        assert tuple(passage.points[0]) == problem.start[:2]
+        assert math.dist(passage.points[-1], problem.goal[:2]) <= problem.goal_tolerance_xy + 1e-9
+        if passage.radius < problem.vehicle.robot_radius:
+            assert not are_connected(problem, passage.radius + 3 * spacing)
             narrow += 1
     assert narrow > 3
 

@@ -1,0 +1,147 @@
+"""The widest passage between start and goal: how large a disc that turns on the spot gets through, and where it is narrowest."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._kernels import COMPILED
+from .._kernels.widest_path import WidestPathSearch
+from ..collision.clearance import MARGIN, ClearanceField
+from ..maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map
+from ..problem import Problem
+from ..vehicle import Point
+from .obstacles import ROUNDING, avoids_unknown, rectangle
+
+#: Maximum number of nodes, about, of the grid of samples that passages are sought on ...
+MAX_NODES = 1_000_000 if COMPILED else 50_000
+#: ... and maximum number of cells, about, of the map that they are sought on through unknown space.
+MAX_CELLS = 500_000
+#: Minimum number of points along a passage whose clearance is measured.
+MEASURED = 20_000 if COMPILED else 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """A passage from start to goal for a disc that can turn on the spot.
+
+    Attributes:
+        points: (n, 2) float64 along it, close together [m].
+        radius: a disc of this radius moves all along it and touches no obstacle [m].
+        width: the distance between the obstacles at its narrowest place, twice the clearance there [m].
+        narrowest: (x, y) of that place [m].
+    """
+
+    points: np.ndarray
+    radius: float
+    width: float
+    narrowest: Point
+
+
+def widest_passage(problem: Problem, field: ClearanceField) -> Passage | None:
+    """Find the widest passage from start to goal on a grid of samples, or one that is wide enough; None where there is none.
+
+    Then no passage between start and goal is wider than four of `sample_spacing`.
+    """
+    grid = _SampleGrid(problem.map, field)
+    starts = grid.nodes_at(problem.start[:2], 0.0)
+    targets = grid.nodes_at(problem.goal[:2], problem.goal_tolerance_xy)
+    if len(starts) == 0 or len(targets) == 0:
+        return None
+    is_target = np.zeros(grid.rows * grid.columns, np.int8)
+    is_target[targets] = 1
+    search = WidestPathSearch(field.kernel, grid.first, grid.step_along, (grid.rows, grid.columns), is_target, grid.spacing / 2,
+                              problem.vehicle.inscribed_radius + MARGIN + grid.spacing)
+    _, nodes = search.widest_path(int(starts[np.argmax(field.at(grid.points(starts)))]))
+    if len(nodes) == 0:
+        return None
+    points = grid.points(nodes)
+    to_goal = problem.goal[:2] - points[-1]
+    left = math.hypot(*to_goal)
+    end = points[-1] + to_goal * (max(0.0, left - problem.goal_tolerance_xy) / left if left > 0 else 0.0)
+    return _measured(np.vstack([problem.start[:2], points, end]), field)
+
+
+def widest_passage_through_unknown(problem: Problem) -> Passage | None:
+    """Find a passage that is wide enough for the vehicle where unknown space is taken as free; None where none is found."""
+    if not (isinstance(problem.map, GridMap) and avoids_unknown(problem)):
+        return None
+    grid = _coarsened(problem.map, math.ceil(math.sqrt(problem.map.data.size / MAX_CELLS)))
+    passage = widest_passage(replace(problem, map=grid, allow_unknown=True), ClearanceField(grid, allow_unknown=True))
+    return passage if passage and passage.radius >= problem.vehicle.inscribed_radius else None
+
+
+def sample_spacing(world_map: Map, field: ClearanceField) -> float:
+    """Return the distance between neighbours in the grid of samples on which the widest passage is sought [m].
+
+    Half a cell of a grid map, if that is not too fine: such samples include the middles of all gaps between cells.
+    """
+    _, sides = rectangle(world_map)
+    finest = field.kernel.resolution / 2 if isinstance(world_map, GridMap) else 0.0
+    return max(finest, math.sqrt(math.hypot(*sides[0]) * math.hypot(*sides[1]) / MAX_NODES))
+
+
+class _SampleGrid:
+    """A square grid of samples over the inside of a map."""
+
+    def __init__(self, world_map: Map, field: ClearanceField):
+        corner, sides = rectangle(world_map)
+        lengths = np.hypot(*sides.T)
+        self._field = field
+        self.spacing = sample_spacing(world_map, field)
+        self.columns, self.rows = (max(1, math.ceil(length / self.spacing - 1e-6) - 1) for length in lengths.tolist())
+        self._steps = sides / lengths[:, None] * self.spacing
+        self.step_along = self._steps[0].tolist()
+        self.first = (corner + self._steps.sum(axis=0)).tolist()
+
+    def points(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the (n, 2) positions of nodes [m]."""
+        return self.first + np.column_stack([nodes % self.columns, nodes // self.columns]) @ self._steps
+
+    def nodes_at(self, point: Point, tolerance: float) -> np.ndarray:
+        """Return the nodes within `tolerance` of a point, and those from where a short straight line that is free leads there."""
+        reach = tolerance / self.spacing + 1
+        column, row = (np.array(point) - self.first) @ self._steps.T / self.spacing**2
+        rows, columns = (np.arange(max(0, math.ceil(at - reach)), min(n, math.floor(at + reach) + 1))
+                         for at, n in ((row, self.rows), (column, self.columns)))
+        nodes = (rows[:, None] * self.columns + columns).ravel()
+        left = np.hypot(*(self.points(nodes) - point).T) - tolerance
+        around = (left > 0) & (left <= self.spacing)
+        around[around] = self._field.at(self.points(nodes[around])) > left[around]
+        return nodes[around | (left <= 0)]
+
+
+def _measured(corners: np.ndarray, field: ClearanceField) -> Passage:
+    """Return a passage along straight lines; between points s apart with clearances c, c' there is at least (c + c' - s) / 2."""
+    at_corners = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    arc_lengths = np.union1d(at_corners, np.linspace(0, at_corners[-1], MEASURED))
+    points = np.column_stack([np.interp(arc_lengths, at_corners, corners[:, axis]) for axis in (0, 1)])
+    clearance = field.at(points)
+    radius = float(((clearance[1:] + clearance[:-1] - np.diff(arc_lengths)) / 2).min())
+    return Passage(points, radius, *_narrowest(corners, field.at(corners)))
+
+
+def _narrowest(corners: np.ndarray, clearance: np.ndarray) -> tuple[float, Point]:
+    """Return width and position of the narrowest place: the middle of the first, after which the search need not avoid others."""
+    as_narrow = clearance <= clearance.min() + ROUNDING
+    first = int(np.argmax(as_narrow))
+    length = int(np.argmin(np.append(as_narrow[first:], False)))
+    x, y = corners[first + (length - 1) // 2].tolist()
+    return 2 * float(clearance.min()), (x, y)
+
+
+def _coarsened(grid: GridMap, factor: int) -> GridMap:
+    """Return the grid with blocks of `factor` x `factor` cells as cells, each as bad as the worst of them."""
+    if factor == 1:
+        return grid
+    occupied, blocked = (_any_of_blocks(cells, factor) for cells in (grid.blocked(True), grid.blocked(False)))
+    for axis, n in enumerate(grid.data.shape):
+        if n % factor:  # the last block reaches beyond the map
+            np.moveaxis(occupied, axis, 0)[-1] = True
+    data = np.where(occupied, OCCUPIED, np.where(blocked, UNKNOWN, FREE)).astype(np.int8)
+    return GridMap(data, grid.resolution * factor, grid.origin, grid.name)
+
+
+def _any_of_blocks(cells: np.ndarray, factor: int) -> np.ndarray:
+    rows, columns = (np.arange(0, n, factor) for n in cells.shape)
+    return np.logical_or.reduceat(np.logical_or.reduceat(cells, rows, axis=0), columns, axis=1)
