@@ -30,7 +30,8 @@ def installed(folder, *patterns):
 
 
 ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
-TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "ruff>=0.6"]
+PLOTS = ["matplotlib>=3.6", "tqdm>=4.64"]
+TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "mypy>=1.8", "ruff>=0.6", *PLOTS]
 
 setup(
     name=PACKAGE,
@@ -50,9 +51,9 @@ setup(
         # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
         (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt"]),
     ],
-    install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0",
-                      "matplotlib>=3.6", "tqdm>=4.64"],
-    extras_require={"ros": ROS, "test": TEST},
+    install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0"],
+    # Pictures and progress bars; a robot plans without them. What dubins_rrt_ros.evaluation imports besides is the same today.
+    extras_require={"ros": ROS, "plots": PLOTS, "evaluation": PLOTS, "test": TEST},
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.main:main",

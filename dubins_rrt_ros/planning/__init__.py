@@ -13,6 +13,8 @@ search `Tree`. `prepare` does once for many problems what depends on map and veh
 radians, times in seconds. Errors that are raised on purpose derive from `PlanningError`.
 """
 
+import warnings
+
 from ._kernels import COMPILED as kernels_compiled
 from .audit import Audit, audit_path
 from .collision.clearance import ClearanceField
@@ -43,3 +45,7 @@ __all__ = [  # noqa: RUF022 - by what a user needs, in this order
     # the rest
     "WORDS", "ClearanceField", "Pose", "checked_pose", "kernels_compiled", "options", "values",
 ]
+
+if not kernels_compiled:
+    warnings.warn("the kernels are interpreted, some hundred times slower than compiled; install a C compiler and Cython, then "
+                  "this package again", RuntimeWarning, stacklevel=2)

@@ -51,7 +51,7 @@ def test_without_ros_the_remedy_is_told_in_one_line(monkeypatch, tmp_path, capsy
     monkeypatch.setattr(demo.importlib.util, "find_spec", lambda name: None)
     assert main(["demo", "--plot", str(tmp_path / "demo.png")]) == 1
     error = capsys.readouterr().err
-    assert "pip install '.[ros]'" in error and error.count("\n") == 1
+    assert "pip install 'dubins_rrt_ros[ros]'" in error and error.count("\n") == 1
 
 
 def test_an_interrupted_demo_leaves_no_node_behind(tmp_path, monkeypatch, environment, capsys):

@@ -40,6 +40,7 @@ def test_a_full_disk_is_told_in_one_line(words):
     assert error.endswith("dubins_rrt plan: error: the output cannot be written: No space left on device\n")
 
 
+@needs_compiled
 def test_without_a_standard_output_it_plans_all_the_same(tmp_path):
     command = f"exec {sys.executable} -m dubins_rrt_ros {' '.join(PLAN)} --json {tmp_path / 'plan.json'} >&-"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=120)
@@ -106,6 +107,7 @@ def test_long_work_shows_a_bar_on_a_terminal_and_no_colours_in_a_pipe():
     assert "/3 [" in shown and "3 problems of seed 0" in out and "\x1b" not in out and "\r" not in out
 
 
+@needs_compiled
 def test_a_pipe_gets_one_line():
     done = subprocess.run([sys.executable, "-m", "dubins_rrt_ros", *PLAN], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0 and done.stderr == "" and done.stdout.count("\n") == 1 and "\x1b" not in done.stdout

@@ -1,4 +1,4 @@
-"""Packages that an installation may lack, for they come with an extra: `pip install 'dubins_rrt_ros[plots]'`."""
+"""Packages that an installation may lack, since they come with an extra, and what to say where one is missing."""
 
 from importlib.util import find_spec
 
@@ -12,7 +12,7 @@ def require_matplotlib(extra: str = "plots") -> None:
         UsageError: matplotlib is not installed; the message names the extra that installs it.
     """
     if find_spec("matplotlib") is None:
-        raise UsageError(f"it draws with matplotlib, which is not installed; run: {install_command(extra)}")
+        raise UsageError(f"pictures are drawn by matplotlib, which is not installed; run: {install_command(extra)}")
 
 
 def install_command(extra: str) -> str:

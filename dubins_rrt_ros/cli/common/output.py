@@ -10,6 +10,7 @@ from typing import Any, TextIO
 from dubins_rrt_ros.planning import Plan
 from dubins_rrt_ros.planning.plan_file import to_document
 
+from .extras import require_matplotlib
 from .parser import UsageError
 
 STDOUT = "-"
@@ -30,13 +31,16 @@ def check_folder(*files: str | None) -> None:
 
 
 def check_drawing(file: str | None) -> None:
-    """Refuse a picture in a format that is not drawn.
+    """Refuse a picture that cannot be drawn; to be called before planning, so that no plan is lost for it.
 
     Raises:
-        UsageError: the name ends otherwise.
+        UsageError: the name ends with no format that is drawn, or there is nothing to draw with.
     """
-    if file and Path(file).suffix.lower() not in DRAWINGS:
+    if not file:
+        return
+    if Path(file).suffix.lower() not in DRAWINGS:
         raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(DRAWINGS)}")
+    require_matplotlib()
 
 
 def words_for(json_file: str | None) -> TextIO:

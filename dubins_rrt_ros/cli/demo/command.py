@@ -15,6 +15,7 @@ from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 from ..common.example import GOAL, MAP, START
+from ..common.extras import install_command
 from ..common.output import check_drawing, check_folder, words_for, write_document
 from ..common.parser import Parser, add_json_flag, describe
 from .process import DemoError, PlannerProcess
@@ -64,7 +65,7 @@ def _demonstrate() -> tuple["Answer", int]:
         DemoError: there is none.
     """
     if importlib.util.find_spec("rclpy") is None:
-        raise DemoError("ROS 2 is not here (no module rclpy); run: pip install '.[ros]'")
+        raise DemoError(f"ROS 2 is not here (no module rclpy); run: {install_command('ros')}")
     # A domain of its own and this machine alone: no robot nearby shall hear of it.
     os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     from .client import DemoClient

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dubins_rrt_ros.cli.common.extras import require_matplotlib
 from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
 from dubins_rrt_ros.cli.common.parser import Parser, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
@@ -32,6 +33,7 @@ def add_arguments(parser: Parser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw, say what was written, and return the exit status."""
     check_folder(arguments.json)
+    require_matplotlib("evaluation")
     folder, figures = Path(arguments.out), all_figures()
     folder.mkdir(parents=True, exist_ok=True)
     files = [file for written in with_bar(_written(figures, folder), len(figures), " figures") for file in written]

@@ -7,6 +7,7 @@ import os
 import time
 from pathlib import Path
 
+from dubins_rrt_ros.cli.common.extras import require_matplotlib
 from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, write_document
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
@@ -41,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         if getattr(arguments, name) < 1:
             raise UsageError(f"--{name} is {getattr(arguments, name)}; give 1 or more")
     check_folder(arguments.json)
+    require_matplotlib("evaluation")
     folder, begin = Path(arguments.out), time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     measured = _measured(folder / LINES, arguments.seeds, arguments.jobs)

@@ -1,7 +1,7 @@
 """The compiled room: Cython in pure Python mode. Numbers and arrays in, numbers and arrays out.
 
 Where a compiler was at hand these modules are extensions that drop the interpreter lock; else the interpreter runs the
-same files, some two hundred times slower.
+same files, some hundred times slower.
 """
 
 from .dubins import COMPILED as COMPILED
