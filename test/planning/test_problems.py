@@ -7,7 +7,7 @@ import pytest
 from support.cases import SCALE, random_maps, random_problem, scaled
 from support.naive import drive, points_along
 
-from dubins_rrt_ros.planning import ClearanceField, Settings, Status, audit_path, plan
+from dubins_rrt_ros.planning import Settings, Status, audit_path, plan
 
 POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIMEOUT, Status.NO_VALID_PATH}
 COUNT = 150 if SCALE == 1 else 15
@@ -27,7 +27,7 @@ def test_random_problems(planner):
         assert result.status in POSSIBLE, result.message
         assert result.message
         assert (result.status == Status.NONE) == (result.path is not None)
-        result.tree.check(ClearanceField(problem.map, problem.allow_unknown), problem.vehicle)
+        result.tree.check(problem.world.field, problem.vehicle)
         if result.path is not None:
             check_path(result, clearance)
         statuses.append(result.status)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, PolygonMap, Problem, Vehicle, _kernels, kernels_compiled
+from dubins_rrt_ros.planning import GridMap, Path, PolygonMap, Problem, Vehicle, World, _kernels, kernels_compiled
 from dubins_rrt_ros.planning.curves.chain import Chain
 from dubins_rrt_ros.planning.curves.dubins import WORDS, DubinsCurve, shortest
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
@@ -81,7 +81,7 @@ def random_map(rng):
 
 @cache
 def random_maps(count):
-    """That many, the same ones in every test, so that each has its distance field computed once."""
+    """That many, the same ones in every test, so that each has its distance field computed once, by `world_of`."""
     rng = np.random.default_rng(count)
     return [random_map(rng) for _ in range(count)]
 
@@ -106,8 +106,14 @@ def free_pose(rng, map, clearance, need):
     return (*point.tolist(), rng.uniform(-math.pi, math.pi))
 
 
+@lru_cache(maxsize=64)
+def world_of(map, allow_unknown):
+    """The world that the vehicles on a map share the clearance of."""
+    return World(map, Vehicle(), allow_unknown)
+
+
 def random_problem(rng, map):
-    """A problem on a map with a random vehicle, and the naive clearance of the map."""
+    """A problem on a prepared map with a random vehicle, and the naive clearance of the map."""
     allow_unknown = bool(rng.random() < 0.3)
     clearance = naive_clearance(map, allow_unknown)
     vehicle = Vehicle(turning_radius=rng.uniform(0.2, 1.2), robot_radius=rng.uniform(0, 0.4))
@@ -115,7 +121,7 @@ def random_problem(rng, map):
     tolerance = {} if rng.random() < 0.6 else {
         "goal_tolerance_xy": rng.uniform(0, 0.5), "goal_tolerance_yaw": rng.uniform(0, 0.5),
         "any_goal_heading": bool(rng.random() < 0.3)}
-    return Problem(map, vehicle, start, goal, allow_unknown=allow_unknown, **tolerance), clearance
+    return Problem(world_of(map, allow_unknown).for_vehicle(vehicle), None, start, goal, **tolerance), clearance
 
 
 def empty_map(side=20.0):
@@ -124,12 +130,7 @@ def empty_map(side=20.0):
 
 
 def field_of(problem):
-    return _field_of(problem.map, problem.allow_unknown)
-
-
-@lru_cache(maxsize=8)
-def _field_of(map, allow_unknown):
-    return ClearanceField(map, allow_unknown)
+    return world_of(problem.map, problem.allow_unknown).field
 
 
 def search_on(problem, settings):
