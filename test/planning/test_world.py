@@ -30,7 +30,7 @@ def problem_in(world):
 def parts_of(world):
     """All that was computed, as arrays."""
     kernel = world.field.kernel
-    names = ("field", "aside") if isinstance(world.map, GridMap) else ("field",)
+    names = ("field", "row_gap") if isinstance(world.map, GridMap) else ("field",)
     need = world.vehicle.inscribed_radius
     squares = world.field.free_squares(need)
     return [*(np.array(getattr(kernel, name)) for name in names), world.field.components(need), squares.is_free,
