@@ -42,7 +42,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={f"{PACKAGE}.planning._kernels": ["*.pxd"]},
+    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.planning._kernels": ["*.pxd"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         installed("", "package.xml"),
