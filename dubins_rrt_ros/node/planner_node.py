@@ -33,7 +33,7 @@ from .worker import Worker
 START_GRACE = 0.5
 #: How often it is said what is waited for [s].
 WAITING_INTERVAL = 5.0
-#: The time that each worker gets to heed its cancellation at shutdown [s].
+#: The time that each worker gets to act on its cancellation at shutdown [s].
 SHUTDOWN_TIMEOUT = 0.2
 
 
@@ -68,6 +68,7 @@ class PlannerNode(Node):
         self._frames = Frames(self, frame)
         # Two, so that neither waits for the other: for goals, of which the newest counts, and for services, all in order.
         self._goal_worker, self._service_worker = Worker("goals"), Worker("services")
+        self._check_worker = Worker("checks")  # of shown paths on newer maps
         self._grace = self._steady_timer(START_GRACE, self._plan)
         self._grace.cancel()
         self._maps = Maps(self, self._configured, self._mailbox, self._note_waiting, self._check_shown_path)
@@ -95,7 +96,8 @@ class PlannerNode(Node):
     def close(self) -> None:
         """End the workers; nothing is published afterwards."""
         self._mailbox.close()
-        self._maps.worker.close(0.0)  # a preparation heeds no cancellation; it ends with the process
+        for worker in (self._maps.worker, self._check_worker):
+            worker.close(0.0)  # preparations and checks cannot be cancelled; they end with the process
         for worker in (self._goal_worker, self._service_worker):
             worker.close(SHUTDOWN_TIMEOUT)
 
@@ -172,7 +174,7 @@ class PlannerNode(Node):
 
     def _begin(self, goal: PoseStamped) -> None:
         """From now on this goal counts alone."""
-        self._goal_worker.cancel()
+        self._goal_worker.cancel_all()
         self._is_planning = False
         self._goal = goal
         self._goal_id = self._next_id()
@@ -245,7 +247,7 @@ class PlannerNode(Node):
                 or not self._maps.is_prepared or not self._configured.read().node.replan_on_map_change):
             return
         problem = replace(shown.problem, map=used.map)
-        self._maps.worker.submit(lambda cancelled: audit_path(shown.path, problem),
+        self._check_worker.submit(lambda cancelled: audit_path(shown.path, problem),
                                  lambda outcome: self._mailbox.post(partial(self._on_checked, shown, used, outcome)))
 
     def _on_checked(self, shown: Plan, used: MapInUse, outcome: Audit | Exception) -> None:
@@ -298,8 +300,8 @@ class PlannerNode(Node):
             self._answer(Status.CANCELLED, messages[0])
         ends = list(self._ends.values())
         self._goal = None  # a changed map does not bring it back
-        self._goal_worker.cancel()
-        self._service_worker.cancel()
+        self._goal_worker.cancel_all()
+        self._service_worker.cancel_all()
         messages += [(await end)[1] for end in ends]
         response.success, response.message = True, " ".join(messages) or "Nothing is being planned."
         return response

@@ -5,10 +5,26 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-#: Called with a function that tells whether the job was cancelled; its result, or what it raises, is the outcome.
-Job = Callable[[Callable[[], bool]], Any]
+#: What a job does: it is called with a function that returns True once the job is cancelled; what it returns, or raises, is the
+#: outcome.
+Work = Callable[[Callable[[], bool]], Any]
 #: Called with the outcome of a job: its result, or the exception that ended it.
 Done = Callable[[Any], None]
+
+
+class Job:
+    """A handle of what was submitted to a worker. It keeps nothing of it alive."""
+
+    def __init__(self):
+        self._cancelled = threading.Event()
+
+    def cancel(self) -> None:
+        """Ask this job alone to end soon. One that waits is still begun, so that it has an outcome."""
+        self._cancelled.set()
+
+    def is_cancelled(self) -> bool:
+        """Return True once the job was cancelled."""
+        return self._cancelled.is_set()
 
 
 class Worker:
@@ -20,30 +36,32 @@ class Worker:
 
     def __init__(self, name: str):
         self._state = threading.Condition()
-        self._jobs: deque[tuple[Job, Done, threading.Event]] = deque()  # the first is the one that is done
+        self._jobs: deque[tuple[Job, Work, Done]] = deque()  # the first is the one that is done
         self._closed = False
-        # A daemon: should a job not heed its cancellation, the process can end nevertheless.
+        # A daemon: should a job ignore its cancellation, the process can end nevertheless.
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def submit(self, job: Job, done: Done) -> None:
+    def submit(self, work: Work, done: Done) -> Job:
         """Do this after what was submitted before."""
+        job = Job()
         with self._state:
-            self._jobs.append((job, done, threading.Event()))
+            self._jobs.append((job, work, done))
             self._state.notify()
+        return job
 
-    def cancel(self) -> None:
-        """Cancel all jobs that were submitted."""
+    def cancel_all(self) -> None:
+        """Cancel every job that was submitted and has not ended."""
         with self._state:
-            for _, _, cancelled in self._jobs:
-                cancelled.set()
+            for job, _, _ in self._jobs:
+                job.cancel()
 
     def close(self, timeout: float) -> bool:
-        """Cancel all, begin nothing more and end the thread; False where it did not end within `timeout` [s]."""
+        """Cancel all jobs, begin none and end the thread; False where it did not end within `timeout` [s]."""
         with self._state:
             self._closed = True
             self._state.notify()
-        self.cancel()
+        self.cancel_all()
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
@@ -55,8 +73,8 @@ class Worker:
 
     def _do_next(self) -> None:
         # In a frame of its own: while the worker waits, nothing keeps the last job's map alive.
-        job, done, cancelled = self._jobs[0]
-        done(_outcome(job, cancelled))
+        job, work, done = self._jobs[0]
+        done(_outcome(work, job))
 
     def _wait(self) -> bool:
         """Wait for a job; False at the end."""
@@ -65,8 +83,8 @@ class Worker:
             return not self._closed
 
 
-def _outcome(job: Job, cancelled: threading.Event) -> Any:
+def _outcome(work: Work, job: Job) -> Any:
     try:
-        return job(cancelled.is_set)
-    except Exception as error:  # a defect must not end the thread; the receiver tells of it
+        return work(job.is_cancelled)
+    except Exception as error:  # a defect must not end the thread; the receiver reports it
         return error

@@ -1,7 +1,9 @@
 """The worker: one job after the other, outcomes, cancel and close. Plain threads, no ROS."""
 
+import gc
 import queue
 import threading
+import weakref
 
 import pytest
 
@@ -10,8 +12,8 @@ from dubins_rrt_ros.node.worker import Worker
 SOON = 5.0
 
 
-class Job:
-    """Ends when it is told to or cancelled, and shows how far it is."""
+class Steps:
+    """Work that ends when it is told to or cancelled, and shows how far it is."""
 
     def __init__(self, name):
         self.name = name
@@ -44,7 +46,7 @@ def begun(job):
 
 
 def test_a_job_is_done_in_another_thread_and_its_outcome_given(worker, outcomes):
-    job = Job("one")
+    job = Steps("one")
     worker.submit(job, outcomes.put)
     assert begun(job).thread.name == "worker under test"
     assert outcomes.empty()
@@ -58,7 +60,7 @@ def test_the_outcome_is_given_in_the_worker_s_thread(worker, outcomes):
 
 
 def test_jobs_are_done_one_at_a_time_in_the_order_in_which_they_come(worker, outcomes):
-    jobs = [Job(str(number)) for number in range(50)]
+    jobs = [Steps(str(number)) for number in range(50)]
     for job in jobs:
         worker.submit(job, outcomes.put)
     for job, later in zip(jobs, [*jobs[1:], None], strict=True):
@@ -68,32 +70,71 @@ def test_jobs_are_done_one_at_a_time_in_the_order_in_which_they_come(worker, out
         assert outcomes.get(timeout=SOON) == f"{job.name} done"
 
 
-def test_cancel_reaches_the_job_that_is_done_and_those_that_wait_and_each_has_its_outcome(worker, outcomes):
-    jobs = [Job(name) for name in ("one", "two", "three")]
+def test_cancel_all_reaches_the_job_that_is_done_and_those_that_wait_and_each_has_its_outcome(worker, outcomes):
+    jobs = [Steps(name) for name in ("one", "two", "three")]
     for job in jobs:
         worker.submit(job, outcomes.put)
     begun(jobs[0])
-    worker.cancel()
+    worker.cancel_all()
     assert [outcomes.get(timeout=SOON) for _ in jobs] == ["one cancelled", "two cancelled", "three cancelled"]
 
 
 def test_what_is_submitted_after_a_cancellation_is_not_cancelled(worker, outcomes):
-    first, second = Job("first"), Job("second")
+    first, second = Steps("first"), Steps("second")
     worker.submit(first, outcomes.put)
     begun(first)
-    worker.cancel()
+    worker.cancel_all()
     worker.submit(second, outcomes.put)
     assert outcomes.get(timeout=SOON) == "first cancelled"
     begun(second).end.set()
     assert outcomes.get(timeout=SOON) == "second done"
 
 
-def test_cancel_without_a_job_does_nothing(worker, outcomes):
-    worker.cancel()
-    job = Job("one")
+def test_cancel_all_without_a_job_does_nothing(worker, outcomes):
+    worker.cancel_all()
+    job = Steps("one")
     worker.submit(job, outcomes.put)
     begun(job).end.set()
     assert outcomes.get(timeout=SOON) == "one done"
+
+
+@pytest.mark.parametrize("cancelled", range(3))
+def test_cancelling_one_job_leaves_two_others_running(worker, outcomes, cancelled):
+    jobs = [Steps(name) for name in ("one", "two", "three")]
+    handles = [worker.submit(job, outcomes.put) for job in jobs]
+    begun(jobs[0])
+    handles[cancelled].cancel()
+    for number, job in enumerate(jobs):
+        begun(job)
+        if number != cancelled:
+            assert outcomes.empty()
+            job.end.set()
+        ending = "cancelled" if number == cancelled else "done"
+        assert outcomes.get(timeout=SOON) == f"{job.name} {ending}"
+
+
+def test_cancelling_a_job_that_has_ended_does_nothing(worker, outcomes):
+    handle = worker.submit(lambda cancelled: "one", outcomes.put)
+    assert outcomes.get(timeout=SOON) == "one"
+    handle.cancel()
+    job = Steps("two")
+    worker.submit(job, outcomes.put)
+    begun(job).end.set()
+    assert outcomes.get(timeout=SOON) == "two done"
+
+
+def test_a_handle_keeps_nothing_of_its_job_alive(worker, outcomes):
+    job = Steps("one")
+    handle = worker.submit(job, outcomes.put)
+    begun(job).end.set()
+    assert outcomes.get(timeout=SOON) == "one done"
+    worker.submit(lambda cancelled: None, outcomes.put)  # its begin is the end of what was kept of the last
+    outcomes.get(timeout=SOON)
+    kept = weakref.ref(job)
+    del job
+    gc.collect()
+    assert kept() is None
+    handle.cancel()
 
 
 def test_a_defect_is_the_outcome_with_its_trace_and_the_thread_lives_on(worker, outcomes):
@@ -124,12 +165,16 @@ def test_jobs_from_many_threads_are_all_done(worker, outcomes):
 
 
 def test_a_job_may_submit_another(worker, outcomes):
-    worker.submit(lambda cancelled: worker.submit(lambda cancelled: "inner", outcomes.put), outcomes.put)
-    assert [outcomes.get(timeout=SOON) for _ in range(2)] == [None, "inner"]
+    def submit_another(cancelled):
+        worker.submit(lambda cancelled: "inner", outcomes.put)
+        return "outer"
+
+    worker.submit(submit_another, outcomes.put)
+    assert [outcomes.get(timeout=SOON) for _ in range(2)] == ["outer", "inner"]
 
 
 def test_close_cancels_the_job_that_is_done_begins_no_other_and_ends_the_thread(outcomes):
-    worker, job, waiting = Worker("closing"), Job("one"), Job("two")
+    worker, job, waiting = Worker("closing"), Steps("one"), Steps("two")
     worker.submit(job, outcomes.put)
     worker.submit(waiting, outcomes.put)
     begun(job)
