@@ -21,6 +21,7 @@ def without_extras(folder, *words):
     return subprocess.run([sys.executable, "-c", BLOCKED, *words], cwd=folder, capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_plan_audit_render_bench_and_campaign_do_not_need_them(tmp_path):
     problem = ('[{"name": "maze", "map": "maze.yaml", "start": [1.5, 2, 1.57], "goal": [13.5, 10.5, 1.57], '

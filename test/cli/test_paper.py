@@ -85,6 +85,7 @@ def test_the_runs_are_those_of_the_papers_algorithms(lengths):
     assert lengths[Run("forest", "rrt", 3000, "field", 2.0, 0)] == limited.length
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_the_report_is_whole_and_shows_every_figure(folder):
     text = (folder / "report.md").read_text()
@@ -105,6 +106,7 @@ def test_rrt_with_headings_towards_the_goal_never_passes_the_second_wall(folder,
     assert "finds a path through the maze with 0 of 2 seeds" in " ".join((folder / "report.md").read_text().split())
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_json_holds_the_tables_and_the_answer(folder, lengths):
     document = json.loads((folder.parent / "answer.json").read_text())

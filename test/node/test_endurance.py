@@ -84,7 +84,7 @@ def test_the_first_path_comes_soon(planners, report):
     client, times = talk.client, []
     client.send("start_pose", MAZE_START)
     talk.goal(MAZE_GOAL, revision="2")
-    for _ in range(100):
+    for _ in range(50):
         client.paths.clear()
         client.statuses.clear()
         sent = time.monotonic()

@@ -13,11 +13,12 @@ POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIM
 COUNT = 150 if SCALE == 1 else 15
 
 
-@pytest.mark.parametrize("planner", ["rrt", pytest.param("rrt_star", marks=pytest.mark.slow)])
-def test_random_problems(planner):
+@pytest.mark.parametrize(("planner", "count"), [
+    ("rrt_star", 15), *(pytest.param(planner, COUNT, marks=pytest.mark.slow) for planner in ("rrt", "rrt_star"))])
+def test_random_problems(planner, count):
     rng = np.random.default_rng({"rrt": 1, "rrt_star": 2}[planner])
     statuses = []
-    for seed in range(COUNT):
+    for seed in range(count):
         problem, clearance = random_problem(rng, random_maps(30)[seed % 30])
         settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=60.0,
                             step_size=float(rng.choice([0.0, 0.0, 1.0])),
@@ -31,7 +32,7 @@ def test_random_problems(planner):
         if result.path is not None:
             check_path(result, clearance)
         statuses.append(result.status)
-    assert statuses.count(Status.NONE) > COUNT / 3
+    assert statuses.count(Status.NONE) > count / 3
     assert statuses.count(Status.NO_VALID_PATH) > 0
 
 
