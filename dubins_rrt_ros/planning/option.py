@@ -86,7 +86,7 @@ class Option(NamedTuple):
         if not (type(value) is self.type or (self.type, type(value)) == (float, int)):
             return False
         if self.low is not None and self.high is not None:
-            return self.low <= value <= self.high  # which is exact for an integer that no float can hold, and false for NaN
+            return bool(self.low <= value <= self.high)  # exact for an integer that no float can hold, and false for NaN
         return not self.choices or value in self.choices
 
 

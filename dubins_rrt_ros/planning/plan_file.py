@@ -109,7 +109,8 @@ def _read_curve(curve: Any) -> DubinsCurve:
 def _triple(numbers: Any, name: str) -> tuple[float, float, float]:
     if not (isinstance(numbers, list) and len(numbers) == 3 and all(map(is_number, numbers))):
         raise PlanFileError(f"{name} holds {quoted(numbers)} where three finite numbers are due")
-    return tuple(map(float, numbers))
+    x, y, z = map(float, numbers)
+    return x, y, z
 
 
 def _field(document: Mapping[str, Any], name: str, kind: type) -> Any:

@@ -1,6 +1,7 @@
 """plan(): from a problem to an audited path, or to the reason why there is none."""
 
 import math
+import secrets
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -68,7 +69,7 @@ def _with_seed(settings: Settings) -> Settings:
     """Return the settings with a fresh seed in place of -1."""
     if settings.seed >= 0:
         return settings
-    return replace(settings, seed=int(np.random.SeedSequence().entropy % 2**31))
+    return replace(settings, seed=secrets.randbits(31))
 
 
 def _never() -> bool:
@@ -140,10 +141,11 @@ class _Call:
             cancelled = cancelled or self._cancel()
             if search.best >= 0 and self._time_to_first is None:
                 self._time_to_first = self._elapsed
-            improved = search.best >= 0 and search.length < best - LEAST_IMPROVEMENT
+            length = search.length
+            improved = length is not None and length < best - LEAST_IMPROVEMENT
             if improved or self._elapsed - reported >= REPORT_INTERVAL:
-                best, reported = search.length or math.inf, self._elapsed
-                self._on_progress(Progress(search.samples, reported, search.length, improved, lambda: self._snapshot(search)))
+                best, reported = length or math.inf, self._elapsed
+                self._on_progress(Progress(search.samples, reported, length, improved, lambda: self._snapshot(search)))
         return self._end_of(search, field, cancelled)
 
     def _distances_if_needed(self, field: ClearanceField) -> DistanceField | None:

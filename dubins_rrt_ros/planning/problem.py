@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from .errors import PlanningError
-from .maps.model import Map
+from .maps.model import GridMap, Map, PolygonMap
 from .option import OptionError, convert_options, documented, option
 from .text import quoted
 from .vehicle import Vehicle
@@ -67,9 +67,10 @@ class Problem:
                  goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0, goal_tolerance_yaw: float = 0.0,
                  any_goal_heading: bool = False, allow_unknown: bool = False, world: PreparedMap | None = None):
         """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
-        if not isinstance(map, Map):
+        if not isinstance(map, GridMap | PolygonMap):
             _check_fit(map, vehicle, allow_unknown)
-            map, vehicle, allow_unknown, world = map.map, map.vehicle, map.allow_unknown, map
+            world = map
+            map, vehicle, allow_unknown = world.map, world.vehicle, world.allow_unknown
         if not isinstance(vehicle, Vehicle):
             raise TypeError(f"the vehicle is {quoted(vehicle)}; give a Vehicle, or a World in place of map and vehicle")
         if world is not None and (world.map, world.vehicle, world.allow_unknown) != (map, vehicle, allow_unknown):

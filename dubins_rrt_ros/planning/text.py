@@ -61,7 +61,7 @@ def distinct(*values: float) -> tuple[str, ...]:
 
 
 class _Short(reprlib.Repr):
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self.maxlevel, self.maxother = 2, 60
 

@@ -15,12 +15,14 @@ from .text import quoted
 
 #: A point (x, y) [m].
 Point = tuple[float, float]
+#: The corners of a polygon around the reference point, in the vehicle's frame.
+Footprint = tuple[Point, ...]
 
 #: Maximum number of corners of a footprint.
 MAX_CORNERS = 100
 
 
-def _read_footprint(value: Any) -> tuple[Point, ...]:
+def _read_footprint(value: Any) -> Footprint:
     """Return the corners of a footprint, counter-clockwise; none for an empty one.
 
     Raises:
@@ -32,7 +34,7 @@ def _read_footprint(value: Any) -> tuple[Point, ...]:
 
 
 @lru_cache(maxsize=64)
-def _read_footprint_text(text: str) -> tuple[Point, ...]:
+def _read_footprint_text(text: str) -> Footprint:
     if not text:
         return ()
     try:
@@ -42,7 +44,7 @@ def _read_footprint_text(text: str) -> tuple[Point, ...]:
     return _checked_corners(corners, text)
 
 
-def _checked_corners(given: Any, value: Any) -> tuple[Point, ...]:
+def _checked_corners(given: Any, value: Any) -> Footprint:
     """Return corners as a polygon around the reference point has them; `value` is what messages show."""
     if given == ():
         return ()
@@ -66,7 +68,7 @@ def _refused(value: Any, reason: str) -> OptionError:
                        "[[1.0, 0.4], [-0.5, 0.4], [-0.5, -0.4], [1.0, -0.4]]")
 
 
-def _footprint_text(footprint: tuple[Point, ...]) -> str:
+def _footprint_text(footprint: Footprint) -> str:
     return json.dumps(footprint) if footprint else ""
 
 

@@ -13,7 +13,7 @@ from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.figures import command as figures
 from dubins_rrt_ros.evaluation.figures import geometry as figures_geometry
 from dubins_rrt_ros.planning import ClearanceField, Vehicle
-from dubins_rrt_ros.planning.collision.clearance import MARGIN
+from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import shortest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,7 +66,7 @@ def test_the_walk_that_is_drawn_finds_the_curves_free_that_the_planner_finds_fre
             start, goal = ((*point, float(rng.uniform(-4, 4))) for point in points.tolist())
             need, curve = float(rng.uniform(0, 0.5)), shortest(start, goal, 0.7)
             looks = figures_geometry.walk(field, curve, need)
-            free = all(look.clearance >= need + MARGIN for look in looks)
+            free = all(look.clearance >= need + CLEARANCE_MARGIN for look in looks)
             assert free == field.curve_is_free(curve, Vehicle(robot_radius=need))
             found.append(free)
     assert 20 < sum(found) < 180

@@ -125,7 +125,7 @@ def test_prepare_does_what_does_not_depend_on_the_request(monkeypatch):
     from dubins_rrt_ros.planning.collision import clearance as module
 
     world = prepare(walled(-1), VEHICLE, allow_unknown=True)
-    for name in ("_grid_parts", "free_squares"):
+    for name in ("grid_clearance", "free_squares"):
         monkeypatch.setattr(module, name, None)
     monkeypatch.setattr(module.ndimage, "label", None)
     assert world.field.components(VEHICLE.robot_radius).max() == 1

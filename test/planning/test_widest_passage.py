@@ -13,7 +13,7 @@ from support.naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
 from dubins_rrt_ros.planning._kernels.widest_path import WidestPathSearch
-from dubins_rrt_ros.planning.collision.clearance import MARGIN
+from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.diagnosis.components import are_separated
 from dubins_rrt_ros.planning.diagnosis.explain import before_search
 from dubins_rrt_ros.planning.diagnosis.widest_passage import sample_spacing, widest_passage
@@ -56,7 +56,7 @@ def crowded_problem(rng):
     corners, clearance = map.corners(), naive_clearance(map)
     points = corners[0] + rng.random((500, 2)) @ (corners[[1, 3]] - corners[0])
     start, goal = points[rng.choice(np.argsort(clearance(points))[-60:], 2, replace=False)]
-    radius = float(rng.uniform(0.6, 1.0) * clearance(np.array([start, goal])).min()) - MARGIN
+    radius = float(rng.uniform(0.6, 1.0) * clearance(np.array([start, goal])).min()) - CLEARANCE_MARGIN
     tolerance = float(rng.choice([0.0, 0.2]))
     return Problem(map, Vehicle(0.5, radius), (*start.tolist(), 0.0), (*goal.tolist(), 0.0), goal_tolerance_xy=tolerance)
 
@@ -101,7 +101,7 @@ def test_random_problems_have_true_reasons():
         if reason is None:
             continue
         seen.add(reason.status)
-        need = problem.vehicle.robot_radius + MARGIN
+        need = problem.vehicle.robot_radius + CLEARANCE_MARGIN
         if reason.status in (Status.START_OCCUPIED, Status.START_OUTSIDE_MAP):
             assert clearance(np.array([problem.start[:2]]))[0] < need
         elif reason.status in (Status.GOAL_OCCUPIED, Status.GOAL_OUTSIDE_MAP):

@@ -92,24 +92,24 @@ def counted(monkeypatch, *names):
 
 
 def test_two_vehicles_on_one_map_prepare_once_each(monkeypatch):
-    calls = counted(monkeypatch, "_grid_parts", "free_squares")
+    calls = counted(monkeypatch, "grid_clearance", "free_squares")
     small = world_of()
     large = small.for_vehicle(LARGE)
     for _ in range(3):
         for world in (small, large):
             assert plan(problem_in(world), QUICK).problem.vehicle == world.vehicle
-    assert calls == {"_grid_parts": 1, "free_squares": 2}
+    assert calls == {"grid_clearance": 1, "free_squares": 2}
     assert_same(large, prepare(small.map, LARGE))
     assert_same(small, prepare(small.map, SMALL))
 
 
 def test_a_vehicle_that_takes_as_much_room_shares_all(monkeypatch):
     small = world_of()
-    calls = counted(monkeypatch, "_grid_parts", "free_squares")
+    calls = counted(monkeypatch, "grid_clearance", "free_squares")
     turning = small.for_vehicle(replace(SMALL, turning_radius=2.0))
     assert turning.vehicle.turning_radius == 2.0
     assert turning.field.kernel is small.field.kernel
-    assert calls == {"_grid_parts": 0, "free_squares": 0}
+    assert calls == {"grid_clearance": 0, "free_squares": 0}
 
 
 @pytest.mark.parametrize("make", [boxes_grid, holed_polygons])

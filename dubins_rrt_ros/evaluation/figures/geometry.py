@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from dubins_rrt_ros.cli.common.plots import CULPRIT, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle
-from dubins_rrt_ros.planning.collision.clearance import MARGIN
 from dubins_rrt_ros.planning.collision.footprint import cover
+from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import candidates, shortest
 
 #: The width of a figure [inch], and the sizes of its letters.
@@ -147,16 +147,16 @@ def walk(field: ClearanceField, curve: DubinsCurve, need: float) -> list[Look]:
     looks, s = [], 0.0
     while s <= curve.length:
         looks.append(_look(field, curve.pose_at(s), need))
-        if looks[-1].clearance < need + MARGIN:
+        if looks[-1].clearance < need + CLEARANCE_MARGIN:
             return looks
-        s += looks[-1].clearance - need + MARGIN / 2
+        s += looks[-1].clearance - need + CLEARANCE_MARGIN / 2
     return [*looks, _look(field, curve.end, need)]
 
 
 def _look(field: ClearanceField, pose: Pose, need: float) -> Look:
     point = np.array(pose[:2])
     bound = float(np.asarray(field.kernel.field)[field.cells(point)])
-    is_exact = bound < need + MARGIN + field.kernel.resolution
+    is_exact = bound < need + CLEARANCE_MARGIN + field.kernel.resolution
     return Look(pose[:2], float(field.at(point)) if is_exact else bound, is_exact)
 
 

@@ -8,14 +8,13 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-Point = tuple[float, float]
-Outline = tuple[Point, ...]
+from ..vehicle import Footprint
 
-#: Each disc covers a piece; there are so many beside each other, and at most so many one after the other.
+#: Number of discs side by side across a footprint, and maximum number one after the other along it; each covers a piece.
 PIECES_PER_WIDTH = 2
-MOST_PIECES_PER_LENGTH = 12
-#: At so many points on their rims the discs are compared with the footprint.
-RIM = 361
+MAX_PIECES_PER_LENGTH = 12
+#: Number of points on the rim of each disc that are compared with the footprint.
+RIM_POINTS = 361
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +26,7 @@ class Cover:
         excess: how far the discs reach beyond the footprint, about [m].
         corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and by how much they move per
             metre that the part is made wider by, which is at most sqrt(2).
-        first_corner: (p + 1,) int32: where the corners of each part begin.
+        first_corner: (p + 1,) int32: index of the first corner of each part, and the number of corners.
     """
 
     discs: np.ndarray
@@ -37,48 +36,49 @@ class Cover:
 
 
 @lru_cache(maxsize=64)
-def cover(outline: Outline) -> Cover:
-    """What covers a footprint whose corners (x, y), counter-clockwise, are `outline` [m]."""
-    polygon = shapely.Polygon(outline)
+def cover(footprint: Footprint) -> Cover:
+    """Return what covers a footprint, whose corners are counter-clockwise."""
+    polygon = shapely.Polygon(footprint)
     discs = np.array([_disc_around(piece, polygon) for piece in _pieces(polygon)])
-    parts = [_widened(part) for part in _convex_parts(outline)]
+    parts = [_widened(part) for part in _convex_parts(footprint)]
     first_corner = np.cumsum([0, *map(len, parts)]).astype(np.int32)
     return Cover(discs, float(shapely.distance(polygon, shapely.points(_rims(discs))).max()), np.concatenate(parts), first_corner)
 
 
-def summary(outline: Outline) -> str:
-    """What covers a footprint, in words."""
-    found = cover(outline)
-    return (f"a footprint of {len(outline)} corners, covered by {len(found.discs)} discs that reach {found.excess:.2f} m beyond "
-            "it (nearer to obstacles than that, the footprint itself decides)")
+def summary(footprint: Footprint) -> str:
+    """Return what covers a footprint, in words."""
+    found = cover(footprint)
+    return (f"a footprint of {len(footprint)} corners, covered by {len(found.discs)} discs that reach {found.excess:.2f} m "
+            "beyond it (nearer to obstacles than that, the footprint itself decides)")
 
 
 def _rims(discs: np.ndarray) -> np.ndarray:
-    """(m, RIM, 2) points on the rims of discs."""
-    bearing = np.linspace(0, math.tau, RIM)
-    return discs[:, None, :2] + discs[:, None, 2:3] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    """Return (m, RIM_POINTS, 2) points on the rims of discs."""
+    bearing = np.linspace(0, math.tau, RIM_POINTS)
+    points: np.ndarray = discs[:, None, :2] + discs[:, None, 2:3] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    return points
 
 
 def _pieces(polygon: shapely.Polygon) -> list[shapely.Geometry]:
-    """The footprint, cut into pieces that are about as long as wide."""
+    """Cut the footprint into pieces that are about as long as wide."""
     low, high = np.array(polygon.bounds).reshape(2, 2)
-    side = max((high - low).min() / PIECES_PER_WIDTH, (high - low).max() / MOST_PIECES_PER_LENGTH)
+    side = max((high - low).min() / PIECES_PER_WIDTH, (high - low).max() / MAX_PIECES_PER_LENGTH)
     columns, rows = (np.linspace(a, b, math.ceil((b - a) / side - 1e-9) + 1) for a, b in zip(low, high, strict=True))
     squares = (shapely.box(x0, y0, x1, y1) for x0, x1 in pairwise(columns) for y0, y1 in pairwise(rows))
     return [piece for piece in map(polygon.intersection, squares) if piece.area > 0]
 
 
 def _disc_around(piece: shapely.Geometry, polygon: shapely.Polygon) -> tuple[float, float, float, float]:
-    """The smallest disc around a piece, and the radius of a disc with its centre that the polygon covers."""
+    """Return the smallest disc around a piece, and the radius of a disc with its centre that the polygon covers."""
     centre = shapely.minimum_bounding_circle(piece).centroid
     radius = max(math.dist((centre.x, centre.y), corner) for corner in shapely.get_coordinates(piece).tolist())
     inner = shapely.distance(polygon.exterior, centre) if polygon.contains(centre) else 0.0
     return centre.x, centre.y, radius * (1 + 1e-9), inner * (1 - 1e-9)
 
 
-def _convex_parts(outline: Outline) -> list[np.ndarray]:
-    """(k, 2) corners of convex parts that make up the footprint: itself, or triangles."""
-    corners = np.array(outline)
+def _convex_parts(footprint: Footprint) -> list[np.ndarray]:
+    """Return the (k, 2) corners of convex parts that make up the footprint: itself, or triangles."""
+    corners = np.array(footprint)
     if _turns(corners).min() >= 0:
         return [corners[_turns(corners) > 0]]
     parts = []
@@ -90,13 +90,14 @@ def _convex_parts(outline: Outline) -> list[np.ndarray]:
 
 
 def _turns(corners: np.ndarray) -> np.ndarray:
-    """(k,) the sine of the turn at each corner, times the lengths of its edges."""
+    """Return (k,) the sine of the turn at each corner, times the lengths of its edges."""
     to, onward = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-    return to[:, 0] * onward[:, 1] - to[:, 1] * onward[:, 0]
+    turns: np.ndarray = to[:, 0] * onward[:, 1] - to[:, 1] * onward[:, 0]
+    return turns
 
 
 def _ear(corners: np.ndarray) -> int:
-    """A corner that can be cut off: its triangle holds no other corner. There is one, as the outline does not touch itself."""
+    """Return a corner that can be cut off: its triangle holds no other. There is one, as the footprint does not touch itself."""
     turns = _turns(corners)
     flat = np.flatnonzero(turns == 0)
     if len(flat):
@@ -110,7 +111,7 @@ def _ear(corners: np.ndarray) -> int:
 
 
 def _widened(corners: np.ndarray) -> np.ndarray:
-    """(2 k, 4): a convex part whose corners are cut off, so that made wider it stays within sqrt(2) of that.
+    """Return (2 k, 4): a convex part whose corners are cut off, so that made wider it stays within sqrt(2) of that.
 
     Each corner becomes two: where the line along either edge and the one that cuts the corner off, each moved outwards by a
     metre, meet. The edges have the unit normals n and m, the cut has u = (n + m) / |n + m|; the lines of n and u meet at

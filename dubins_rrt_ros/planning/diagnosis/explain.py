@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ..collision.clearance import MARGIN, ClearanceField
+from ..collision.clearance import ClearanceField
+from ..collision.raster import CLEARANCE_MARGIN
 from ..maps.model import GridMap
 from ..problem import Pose, Problem
 from ..result import Status
@@ -51,12 +52,13 @@ class Diagnosis:
 
 def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
     """Return why there provably is no path, if that can be known without a search."""
+    required = problem.vehicle.inscribed_radius + CLEARANCE_MARGIN
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
             ("Goal", problem.goal, problem.goal_tolerance_xy, Status.GOAL_OUTSIDE_MAP, Status.GOAL_OCCUPIED)):
         nearest = nearest_in_map(problem.map, pose[:2])
         away = math.dist(pose[:2], nearest)
-        if away > tolerance + ROUNDING or has_no_room(field, problem.vehicle.inscribed_radius + MARGIN, pose[:2], tolerance):
+        if away > tolerance + ROUNDING or has_no_room(field, required, pose[:2], tolerance):
             if away > ROUNDING:
                 return Diagnosis(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
             return Diagnosis(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
@@ -103,12 +105,11 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str)
 def _outside_message(problem: Problem, name: str, pose: Pose, tolerance: float, nearest: Point) -> str:
     corners = problem.map.corners()
     low, high = corners.min(axis=0), corners.max(axis=0)
-    yaw = problem.map.origin[2] if isinstance(problem.map, GridMap) else 0.0
-    if yaw == 0:
-        spans = f"spans x {low[0]:.2f} to {high[0]:.2f} m and y {low[1]:.2f} to {high[1]:.2f} m"
-    else:
-        width, height = problem.map.size
+    if isinstance(problem.map, GridMap) and problem.map.origin[2] != 0:
+        (width, height), yaw = problem.map.size, problem.map.origin[2]
         spans = f"spans {width:.2f} m x {height:.2f} m from its corner {at(corners[0])} on, turned by {yaw:.3g} rad"
+    else:
+        spans = f"spans x {low[0]:.2f} to {high[0]:.2f} m and y {low[1]:.2f} to {high[1]:.2f} m"
     reach = f", and goal_tolerance_xy {tolerance:g} m reaches no place with room enough in it" if tolerance else ""
     return (f"{name} ({pose[0]:.6g}, {pose[1]:.6g}) is {metres(math.dist(pose[:2], nearest))} m outside the map, which {spans}"
             f"{reach}; check the pose and its frame.")
@@ -116,14 +117,14 @@ def _outside_message(problem: Problem, name: str, pose: Pose, tolerance: float, 
 
 def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, tolerance: float) -> tuple[str, Point]:
     """Return the sentence on a pose without room, and the nearest obstacle."""
-    required = problem.vehicle.inscribed_radius + MARGIN
+    required = problem.vehicle.inscribed_radius + CLEARANCE_MARGIN
     clearance = float(field.at(np.array(point)))
     nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, point, clearance)
     found, needed = distinct(clearance, required)
     message = f"{name} is occupied: clearance {found} m, needed {needed} m"
     if tolerance:
         message += f", which no place within goal_tolerance_xy {tolerance:g} m has"
-    if what == UNKNOWN_SPACE:
+    if isinstance(problem.map, GridMap) and what == UNKNOWN_SPACE:
         opened = ClearanceField(problem.map.window(point, 2 * (tolerance + required)), allow_unknown=True)
         if not has_no_room(opened, required, point, tolerance):
             where = f"only unknown space is that near, at {at(nearest)}" if clearance > 0 else f"{at(point)} lies in {what}"
@@ -143,7 +144,7 @@ def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose)
     if math.dist(nearest, worst) <= ROUNDING:
         nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, worst, float(clearance.min()))
     message = f"{name} is occupied: the footprint touches {'an ' if what == OBSTACLE else ''}{what} at {at(nearest)}"
-    if what == UNKNOWN_SPACE:
+    if isinstance(problem.map, GridMap) and what == UNKNOWN_SPACE:
         around = problem.map.window(pose[:2], 2 * problem.vehicle.robot_radius)
         if ClearanceField(around, allow_unknown=True).pose_is_free(pose, problem.vehicle):
             return f"{message}: drive there to map it, or set allow_unknown.", nearest
@@ -187,7 +188,7 @@ def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Poin
     if passage is None:
         return None
     clearance = field.at(passage.points)
-    first = int(np.argmax(clearance < problem.vehicle.inscribed_radius + MARGIN))
+    first = int(np.argmax(clearance < problem.vehicle.inscribed_radius + CLEARANCE_MARGIN))
     begins, _ = nearest_obstacle(problem.map, False, tuple(passage.points[first].tolist()), float(clearance[first]))
     return (f"unknown space separates start and goal for {_size(problem.vehicle)}; on the way between them "
             f"it begins at {at(begins)}; drive there to map it, or set allow_unknown"), begins
@@ -200,8 +201,8 @@ def _narrow_between(problem: Problem, field: ClearanceField, passage: Passage | 
         passage: the widest one between them, if there is one.
     """
     vehicle, smaller = problem.vehicle, f"or {_smaller(problem.vehicle)}"
-    if passage and passage.radius > MARGIN:
-        radius = rounded_down(passage.radius - MARGIN)
+    if passage and passage.radius > CLEARANCE_MARGIN:
+        radius = rounded_down(passage.radius - CLEARANCE_MARGIN)
         lack = (f"{_size(vehicle)} does not fit" if vehicle.footprint
                 else f"with radius {radius} m instead of {vehicle.robot_radius:g} m they are connected")
         return (f"the widest way found between start and goal is {metres(passage.width)} m wide at {at(passage.narrowest)}; "
@@ -224,7 +225,7 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
 
     So it is with a vehicle that faces a wall closer than its turning radius. Each step along an arc is as long as the clearance.
     """
-    required = problem.vehicle.inscribed_radius + MARGIN
+    required = problem.vehicle.inscribed_radius + CLEARANCE_MARGIN
     curvature = CURVATURES / problem.vehicle.turning_radius
     driven = np.zeros(len(curvature))
     for _ in range(MAX_STEPS):
@@ -239,5 +240,5 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
             there = nearest_in_map(problem.map, tuple(points[longest].tolist()))
             hit, _ = nearest_obstacle(problem.map, problem.allow_unknown, there, float(clearance[longest]))
             return float(driven[longest]), hit
-        driven += np.where(clearance >= required, clearance - required + MARGIN, 0)
+        driven += np.where(clearance >= required, clearance - required + CLEARANCE_MARGIN, 0)
     return None

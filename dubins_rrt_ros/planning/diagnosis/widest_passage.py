@@ -7,7 +7,8 @@ import numpy as np
 
 from .._kernels import COMPILED
 from .._kernels.widest_path import WidestPathSearch
-from ..collision.clearance import MARGIN, ClearanceField
+from ..collision.clearance import ClearanceField
+from ..collision.raster import CLEARANCE_MARGIN
 from ..maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map
 from ..problem import Problem
 from ..vehicle import Point
@@ -51,7 +52,7 @@ def widest_passage(problem: Problem, field: ClearanceField) -> Passage | None:
     is_target = np.zeros(grid.rows * grid.columns, np.int8)
     is_target[targets] = 1
     search = WidestPathSearch(field.kernel, grid.first, grid.step_along, (grid.rows, grid.columns), is_target, grid.spacing / 2,
-                              problem.vehicle.inscribed_radius + MARGIN + grid.spacing)
+                              problem.vehicle.inscribed_radius + CLEARANCE_MARGIN + grid.spacing)
     _, nodes = search.widest_path(int(starts[np.argmax(field.at(grid.points(starts)))]))
     if len(nodes) == 0:
         return None
@@ -96,7 +97,8 @@ class _SampleGrid:
 
     def points(self, nodes: np.ndarray) -> np.ndarray:
         """Return the (n, 2) positions of nodes [m]."""
-        return self.first + np.column_stack([nodes % self.columns, nodes // self.columns]) @ self._steps
+        points: np.ndarray = self.first + np.column_stack([nodes % self.columns, nodes // self.columns]) @ self._steps
+        return points
 
     def nodes_at(self, point: Point, tolerance: float) -> np.ndarray:
         """Return the nodes within `tolerance` of a point, and those from where a short straight line that is free leads there."""
@@ -108,7 +110,8 @@ class _SampleGrid:
         left = np.hypot(*(self.points(nodes) - point).T) - tolerance
         around = (left > 0) & (left <= self.spacing)
         around[around] = self._field.at(self.points(nodes[around])) > left[around]
-        return nodes[around | (left <= 0)]
+        found: np.ndarray = nodes[around | (left <= 0)]
+        return found
 
 
 def _measured(corners: np.ndarray, field: ClearanceField) -> Passage:

@@ -11,6 +11,7 @@ import shapely
 
 from ..errors import PlanningError
 from ..text import one_line
+from .frame import Frame
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 #: Cell values up to the first are free, from the second on occupied, others unknown: map_server's default thresholds,
@@ -86,15 +87,11 @@ class GridMap:
 
     def to_grid_frame(self, points: np.ndarray) -> np.ndarray:
         """(..., 2) points of the map's frame in the grid's own, where cell (0, 0) has its outer corner at (0, 0)."""
-        x, y, yaw = self.origin
-        c, s = math.cos(yaw), math.sin(yaw)
-        return (np.asarray(points, dtype=float) - (x, y)) @ np.array([[c, -s], [s, c]])
+        return Frame(*self.origin).from_map(points)
 
     def to_map_frame(self, points: np.ndarray) -> np.ndarray:
         """(..., 2) points of the grid's own frame in the map's."""
-        x, y, yaw = self.origin
-        c, s = math.cos(yaw), math.sin(yaw)
-        return np.asarray(points, dtype=float) @ np.array([[c, s], [-s, c]]) + (x, y)
+        return Frame(*self.origin).to_map(points)
 
     def window(self, centre: tuple[float, float], reach: float) -> "GridMap":
         """The part of the grid that holds everything within `reach` [m] of a point in it."""

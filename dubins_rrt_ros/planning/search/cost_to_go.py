@@ -73,7 +73,7 @@ class DistanceField:
     def points_in(self, squares: np.ndarray, shares: np.ndarray) -> np.ndarray:
         """(n, 2) points [m] in (n,) squares as `squares_between` gives them, at (n, 2) shares of the sides along and across."""
         row, column = np.divmod(squares, self._free.shape[1] - 1)
-        return self._field.in_map_frame((np.column_stack([column, row]) - 1 + shares) * self.kernel.side)
+        return self._field.frame.to_map((np.column_stack([column, row]) - 1 + shares) * self.kernel.side)
 
     def headings(self, points: np.ndarray) -> np.ndarray:
         """(n,) headings [rad] in which the distances of (n, 2) points fall; NaN where no way is known, and at the source."""
