@@ -7,7 +7,7 @@ from typing import Any
 from dubins_rrt_ros import __version__
 
 from .curves.dubins import WORDS, DubinsCurve
-from .curves.path import Path
+from .curves.path import Path, PathError
 from .errors import PlanningError
 from .maps.model import Map
 from .option import is_number, options, values
@@ -89,7 +89,10 @@ def read_path(document: Mapping[str, Any]) -> Path | None:
     if not poses:
         return None
     curves = tuple(_read_curve(curve) for curve in _field(document, "curves", list))
-    return Path(_triple(poses[0], "poses"), _triple(poses[-1], "poses"), curves)
+    try:
+        return Path.of_curves(_triple(poses[0], "poses"), _triple(poses[-1], "poses"), curves)
+    except PathError as error:
+        raise PlanFileError(f"its curves are no path: {error}") from None
 
 
 def _read_curve(curve: Any) -> DubinsCurve:

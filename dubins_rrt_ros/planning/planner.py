@@ -112,7 +112,7 @@ class _Call:
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
         if self._start_reaches_goal():
             self._time_to_first = self._elapsed
-            return self._with_path(Path(self._problem.start, self._problem.start, ()), self._root, 0)
+            return self._with_path(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
 
     def _prepared_world(self) -> World:

@@ -33,7 +33,7 @@ def square(kind):
 def case(request):
     """A problem and a right path of two curves."""
     problem = Problem(square(request.param), Vehicle(1.0, 0.3), START, GOAL)
-    path = Path(START, GOAL, (shortest(START, VIA, 1.0), shortest(VIA, GOAL, 1.0)))
+    path = Path.of_curves(START, GOAL, (shortest(START, VIA, 1.0), shortest(VIA, GOAL, 1.0)))
     assert audit_function(path, problem).ok
     return problem, path
 
@@ -41,7 +41,18 @@ def case(request):
 def with_curve(path, index, **changes):
     curves = list(path.curves)
     curves[index] = replace(curves[index], **changes)
-    return replace(path, curves=tuple(curves))
+    return Path.of_curves(curves[0].start, path.end, curves)
+
+
+def with_end(path, index, pose):
+    waypoints = path.waypoints.copy()
+    waypoints[index] = pose
+    return replace(path, waypoints=waypoints)
+
+
+def joined(path, *curves):
+    """The curves as a path to the same end."""
+    return Path.of_curves(curves[0].start, path.end, curves)
 
 
 def findings(problem, path):
@@ -61,9 +72,9 @@ def test_a_right_path_passes_with_its_figures(case):
 
 def test_curvature_is_that_of_the_tightest_turn(case):
     problem, _ = case
-    wide = Path(START, GOAL, (shortest(START, VIA, 1.3), shortest(VIA, GOAL, 1.1)))
+    wide = Path.of_curves(START, GOAL, (shortest(START, VIA, 1.1), shortest(VIA, GOAL, 1.1)))
     assert audit_function(wide, problem).max_curvature == pytest.approx(1 / 1.1)
-    straight = Path(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 0.1, "LSL", (0.0, 4.0, 0.0)),))
+    straight = Path.of_curves(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 0.1, "LSL", (0.0, 4.0, 0.0)),))
     verdict = audit_function(straight, Problem(problem.map, Vehicle(0.1, 0.3), START, (6.0, 2.0, 0.0)))
     assert verdict.ok
     assert verdict.max_curvature == 0
@@ -78,12 +89,11 @@ def test_a_gap_is_found(case, axis, off):
     assert "before curve 1 the path jumps" in findings(problem, with_curve(path, 1, start=tuple(moved)))
 
 
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_curve_left_out_is_found(case, index):
+@pytest.mark.parametrize("index, finding", [(0, "before curve 1 the path jumps"), (1, "the path starts at")])
+def test_a_curve_left_out_is_found(case, index, finding):
     problem, path = case
-    assert "the path jumps" in findings(problem, replace(path, curves=(path.curves[index],)))
-    assert "the path jumps" in findings(problem, replace(path, curves=()))
-    assert "the path jumps" in findings(problem, replace(path, curves=path.curves[::-1]))
+    assert finding in findings(problem, joined(path, path.curves[index]))
+    assert "the path jumps" in findings(problem, joined(path, *path.curves[::-1]))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -91,8 +101,8 @@ def test_wrong_ends_are_found(case, axis):
     problem, path = case
     off = [0.0, 0.0, 0.0]
     off[axis] = 1e-4
-    assert "the path starts at" in findings(problem, replace(path, start=tuple(np.add(path.start, off).tolist())))
-    assert "from the goal" in findings(problem, replace(path, end=tuple(np.add(path.end, off).tolist())))
+    assert "the path starts at" in findings(problem, with_end(path, 0, np.add(path.start, off)))
+    assert "from the goal" in findings(problem, with_end(path, -1, np.add(path.end, off)))
     elsewhere = replace(problem, goal=tuple(np.add(problem.goal, off).tolist()))
     assert "from the goal" in findings(elsewhere, path)
 
@@ -108,14 +118,14 @@ def test_the_end_may_use_the_tolerance_and_no_more(case):
 
 def test_a_turn_too_tight_is_found(case):
     problem, path = case
-    tight = Path(START, GOAL, (shortest(START, VIA, 0.999), path.curves[1]))
+    tight = Path.of_curves(START, GOAL, (shortest(START, VIA, 0.999), shortest(VIA, GOAL, 0.999)))
     assert "curve 0 turns with a radius of 0.999 m, tighter than 1 m" in findings(problem, tight)
-    assert "curve 0 cannot be driven" in findings(problem, with_curve(path, 0, radius=-1.0))
+    assert "curve 0 cannot be driven" in findings(problem, replace(path, radius=-1.0))
 
 
 def test_a_negative_length_is_found(case):
     problem, _ = case
-    back_and_forth = Path(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 1.0, "LSL", (-0.5, 4.0, 0.5)),))
+    back_and_forth = Path.of_curves(START, (6.0, 2.0, 0.0), (DubinsCurve(START, 1.0, "LSL", (-0.5, 4.0, 0.5)),))
     assert "curve 0 cannot be driven" in findings(replace(problem, goal=(6.0, 2.0, 0.0)), back_and_forth)
 
 
@@ -125,16 +135,17 @@ def test_what_is_no_number_is_found(case, bad, index):
     problem, path = case
     lengths, start = list(path.curves[1].lengths), list(path.curves[1].start)
     lengths[index] = start[index] = bad
-    for changes in ({"lengths": tuple(lengths)}, {"start": tuple(start)}, {"radius": bad}):
+    for changes in ({"lengths": tuple(lengths)}, {"start": tuple(start)}):
         assert "curve 1 cannot be driven" in findings(problem, with_curve(path, 1, **changes))
-    assert findings(problem, replace(path, start=tuple(start)))
-    assert findings(problem, replace(path, end=tuple(start)))
+    assert "curve 1 cannot be driven" in findings(problem, replace(path, radius=bad))
+    assert findings(problem, with_end(path, 0, start))
+    assert findings(problem, with_end(path, -1, start))
 
 
 def straight_past(map, gap, radius):
     """A problem and a path a metre straight along x, `gap` from the map's lower edge."""
     start, goal = (1.0, gap, 0.0), (2.0, gap, 0.0)
-    return Problem(map, Vehicle(1.0, radius), start, goal), Path(start, goal, (shortest(start, goal, 1.0),))
+    return Problem(map, Vehicle(1.0, radius), start, goal), Path.of_curves(start, goal, (shortest(start, goal, 1.0),))
 
 
 @pytest.mark.slow
@@ -153,7 +164,7 @@ def test_contact_by_a_millimetre_between_any_samples(kind):
         for too_near in (True, False):
             x = 12 - 0.3 - 1.0 + (0.001 if too_near else -0.001)
             start, goal = (x, y, 0.0), (x, y + 2, math.pi)
-            path = Path(start, goal, (DubinsCurve(start, 1.0, "LSL", (math.pi / 2, 0.0, math.pi / 2)),))
+            path = Path.of_curves(start, goal, (DubinsCurve(start, 1.0, "LSL", (math.pi / 2, 0.0, math.pi / 2)),))
             verdict = audit_function(path, Problem(square(kind), Vehicle(1.0, 0.3), start, goal))
             assert verdict.ok != too_near
             assert verdict.min_clearance == pytest.approx(12 - x - 1, abs=0.001)
@@ -166,14 +177,14 @@ def test_a_path_through_a_thin_wall_is_found(thickness, radius):
     map = PolygonMap(shapely.box(0, 0, 12, 12) - shapely.box(6, 0, 6 + thickness, 11))
     for shift in np.linspace(0, 0.1, 7):
         start, goal = (1.0 + shift, 3.0, 0.0), (11.0, 3.0, 0.0)
-        path = Path(start, goal, (shortest(start, goal, 1.0),))
+        path = Path.of_curves(start, goal, (shortest(start, goal, 1.0),))
         assert "the clearance is" in findings(Problem(map, Vehicle(1.0, radius), start, goal), path)
 
 
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_a_path_out_of_the_map_and_back_is_found(kind):
     start, goal = (11.0, 4.0, 0.0), (11.0, 8.0, math.pi)
-    path = Path(start, goal, (shortest(start, goal, 2.0),))
+    path = Path.of_curves(start, goal, (shortest(start, goal, 2.0),))
     assert "the clearance is" in findings(Problem(square(kind), Vehicle(1.0, 0.1), start, goal), path)
 
 
@@ -181,7 +192,7 @@ def test_unknown_space_counts_unless_it_is_allowed():
     data = np.zeros((24, 24))
     data[:, 12] = -1
     start, goal = (2.0, 6.0, 0.0), (10.0, 6.0, 0.0)
-    path = Path(start, goal, (shortest(start, goal, 1.0),))
+    path = Path.of_curves(start, goal, (shortest(start, goal, 1.0),))
     problem = Problem(GridMap(data, 0.5), Vehicle(), start, goal)
     assert "the clearance is" in findings(problem, path)
     assert not findings(replace(problem, allow_unknown=True), path)
@@ -190,10 +201,10 @@ def test_unknown_space_counts_unless_it_is_allowed():
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_a_path_that_stays_where_it_is(kind):
     problem = Problem(square(kind), Vehicle(1.0, 0.3), START, START)
-    verdict = audit_function(Path(START, START, ()), problem)
+    verdict = audit_function(Path.of_pose(START), problem)
     assert verdict.ok
     assert verdict.min_clearance == pytest.approx(2.0)
-    assert not audit_function(Path(START, START, ()), replace(problem, vehicle=Vehicle(1.0, 2.1))).ok
+    assert not audit_function(Path.of_pose(START), replace(problem, vehicle=Vehicle(1.0, 2.1))).ok
 
 
 @pytest.mark.slow
@@ -233,7 +244,7 @@ def test_the_clearance_of_a_point_is_exact_however_far_the_obstacles(side, block
     points = random_points(rng, map, 40)
     poses = [(*point, 0.0) for point in points.tolist()]
     problem = Problem(map, Vehicle(), START, GOAL, allow_unknown=allow_unknown)
-    found = [audit_function(Path(pose, pose, ()), problem).min_clearance for pose in poses]
+    found = [audit_function(Path.of_pose(pose), problem).min_clearance for pose in poses]
     assert found == pytest.approx(naive_clearance(map, allow_unknown)(points), abs=1e-9)
 
 
@@ -248,7 +259,7 @@ def test_the_verdict_on_random_paths_is_that_of_the_naive_twin():
             curve = shortest(start, goal, 0.5)
             least = clearance(points_along(start, curve.word, curve.lengths, 0.5, 0.002)).min()
             radius = float(max(0.01, least + rng.uniform(-0.1, 0.1)))
-            verdict = audit_function(Path(start, goal, (curve,)), Problem(map, Vehicle(0.5, radius), start, goal))
+            verdict = audit_function(Path.of_curves(start, goal, (curve,)), Problem(map, Vehicle(0.5, radius), start, goal))
             if abs(radius - least) > 0.002:
                 assert verdict.ok == (radius < least)
                 verdicts.append(verdict.ok)
@@ -262,7 +273,7 @@ def test_of_a_large_noisy_map_every_part_of_a_path_counts():
     noise = np.where(np.random.default_rng(3).random((60, 5000)) < 0.2, 100, 0).astype(np.int8)
     noise[20:40] = 0
     start, goal = (1.0, 1.5, 0.0), (249.0, 1.5, 0.0)
-    path = Path(start, goal, (shortest(start, goal, 1.0),))
+    path = Path.of_curves(start, goal, (shortest(start, goal, 1.0),))
     for column in (None, *range(100, 4900, 480)):
         data = noise.copy()
         if column is not None:
@@ -275,7 +286,7 @@ def test_of_a_large_noisy_map_every_part_of_a_path_counts():
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_a_map_is_not_kept_alive(kind):
     map = square(kind)
-    assert audit_function(Path(START, START, ()), Problem(map, Vehicle(1.0, 0.3), START, START)).ok
+    assert audit_function(Path.of_pose(START), Problem(map, Vehicle(1.0, 0.3), START, START)).ok
     kept = weakref.ref(map)
     del map
     gc.collect()
@@ -291,7 +302,7 @@ def test_the_audit_shares_no_code_with_the_planner():
         elif isinstance(node, ast.Import):
             imported.update(name.name for name in node.names)
     assert len(own) == 6
-    libraries = {"math", "dataclasses", "weakref", "collections.abc", "numpy", "shapely"}
-    # Of curves only what a curve and a path are.
+    libraries = {"math", "dataclasses", "weakref", "collections.abc", "typing", "numpy", "shapely"}
+    # Of curves only the types, for a type checker.
     assert imported - {f".{file.stem}" for file in own} - libraries == {
         "..curves.dubins", "..curves.path", "..maps.model", "..problem", "..vehicle"}

@@ -26,7 +26,7 @@ def vehicle_of(corners, turning_radius=1.0):
 
 
 def path_of(*curves):
-    return Path(curves[0].start, curves[-1].end, curves)
+    return Path.of_curves(curves[0].start, curves[-1].end, curves)
 
 
 def judged(map, vehicle, *curves, **request):
@@ -179,7 +179,7 @@ def test_a_post_inside_of_the_footprint_is_contact(kind):
         map = PolygonMap(shapely.box(0, 0, 20, 20) - shapely.box(10, 10, 10.1, 10.1))
     for x, free in ((9.0, False), (10.9, False), (6.39, True), (11.01, True)):
         pose = (x, 10.0, 0.0)
-        verdict = audit_path(Path(pose, pose, ()), Problem(map, vehicle_of(CAR), pose, pose))
+        verdict = audit_path(Path.of_pose(pose), Problem(map, vehicle_of(CAR), pose, pose))
         assert verdict.ok == free
         assert verdict.min_clearance == pytest.approx(0.01 if free else 0.0, abs=1e-9)
 
@@ -283,7 +283,7 @@ def test_a_path_beyond_all_bounds_is_found(kind, length):
     start = (10.0, 10.0, 0.0)
     for lengths in ((0.0, length, 0.0), (length, 0.0, 0.0), (0.0, length, length)):
         with np.errstate(all="ignore"):
-            path = Path(start, start, (DubinsCurve(start, 5.0, "LSL", lengths),))
+            path = Path.of_curves(start, start, (DubinsCurve(start, 5.0, "LSL", lengths),))
             findings = audit_path(path, Problem(map, vehicle_of(CAR), start, start)).findings
             assert any("the footprint" in found for found in findings)
 

@@ -37,7 +37,7 @@ def bend(radius=1.0, spacing=0.05):
 @settings(max_examples=60, deadline=None)
 @given(st.lists(POSES, min_size=2, max_size=4), st.sampled_from([0.01, 0.05, 0.3]), st.sampled_from([LONG, DISC]))
 def test_the_poses_of_curves_are_judged_as_the_curves_are(ends, spacing, vehicle):
-    path = Path(ends[0], ends[-1], tuple(shortest(a, b, 1.0) for a, b in pairwise(ends)))
+    path = Path.of_curves(ends[0], ends[-1], tuple(shortest(a, b, 1.0) for a, b in pairwise(ends)))
     poses = path.poses(spacing)
     verdict, known = judged(poses, vehicle), audit_path(path, Problem(YARD, vehicle, path.start, path.end))
     assert verdict.ok and known.ok

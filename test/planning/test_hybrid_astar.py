@@ -6,11 +6,10 @@ import math
 import numpy as np
 import pytest
 from support import naive
-from support.cases import SCALE, empty_map, field_of, interpreted, needs_compiled, path_of, random_maps, random_problem, scaled
+from support.cases import SCALE, arrays_of, empty_map, field_of, interpreted, needs_compiled, random_maps, random_problem, scaled
 
-from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path, load_map
+from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, Problem, Settings, Vehicle, audit_path, load_map
 from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar
-from dubins_rrt_ros.planning.curves.chain import Chain
 from dubins_rrt_ros.planning.curves.dubins import WORDS, shortest
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
@@ -44,10 +43,10 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
                        arc * radius, sectors, weight, visit_penalty, limit, most)
 
 
-def finished(search, portion=1000):
+def finished(search, radius=VEHICLE.turning_radius, portion=1000):
     while not search.ended:
         search.run(portion)
-    return search.path() and Chain(*search.path())
+    return search.path() and Path(*search.path(), radius)
 
 
 def walled():
@@ -56,18 +55,17 @@ def walled():
     return Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), VEHICLE, START, (8.0, -8.0, 2.0))
 
 
-def check(chain, problem):
+def check(path, problem):
     """Each curve keeps the clearance and ends where the next begins, but for the first as it was asked for."""
-    path = path_of(chain, problem.vehicle.turning_radius)
     assert path.start == problem.start
     at = np.array(problem.start)
     for i, curve in enumerate(path.curves, start=1):
         assert min(curve.lengths) >= 0
         assert field_of(problem).curve_is_free(curve, problem.vehicle)
         end = naive.drive(at, curve.word, curve.lengths, curve.radius)
-        np.testing.assert_allclose(end[:2], chain.poses[i, :2], atol=1e-8)
-        assert abs(math.remainder(end[2] - chain.poses[i, 2], math.tau)) <= 1e-9
-        at = chain.poses[i]
+        np.testing.assert_allclose(end[:2], path.waypoints[i, :2], atol=1e-8)
+        assert abs(math.remainder(end[2] - path.waypoints[i, 2], math.tau)) <= 1e-9
+        at = path.waypoints[i]
     assert math.dist(path.end[:2], problem.goal[:2]) <= problem.goal_tolerance_xy
     assert abs(math.remainder(path.end[2] - problem.goal[2], math.tau)) <= problem.yaw_tolerance + 1e-9
     assert audit_path(path, problem).ok
@@ -85,29 +83,29 @@ def test_paths_on_random_problems_are_free_and_lead_to_the_goal():
         if ends.min() < problem.vehicle.robot_radius or not naive.are_connected(problem, problem.vehicle.robot_radius):
             continue
         tried += 1
-        chain, _ = first_path(problem)
-        if chain is not None:
-            check(chain, problem)
+        path, _ = first_path(problem)
+        if path is not None:
+            check(path, problem)
             least = 0 if problem.goal_tolerance_xy > 0 else math.dist(problem.start[:2], problem.goal[:2])
-            assert chain.length >= least - 1e-9
+            assert path.length >= least - 1e-9
             found += 1
     assert found > tried / 2 > 1
 
 
 def test_in_the_open_the_first_path_is_the_dubins_curve():
     problem = Problem(empty_map(), VEHICLE, START, GOAL)
-    chain, _ = first_path(problem, portion=1)
+    path, _ = first_path(problem, portion=1)
     curve = shortest(START, GOAL, 0.5)
-    assert len(chain.words) == 2
-    assert (WORDS[chain.words[1]], tuple(chain.lengths[1])) == (curve.word, curve.lengths)
+    assert len(path.words) == 2
+    assert (WORDS[path.words[1]], tuple(path.lengths[1])) == (curve.word, curve.lengths)
 
 
 @pytest.mark.parametrize("portion", [1, 7, 256, 100_000])
 def test_portions_do_not_change_the_path(portion):
     whole = first_path(walled(), portion=1000)[0]
-    chain = first_path(walled(), portion=portion)[0]
-    assert [array.tobytes() for array in chain] == [array.tobytes() for array in whole]
-    assert len(chain.words) > 10
+    path = first_path(walled(), portion=portion)[0]
+    assert arrays_of(path) == arrays_of(whole)
+    assert len(path.words) > 10
 
 
 @needs_compiled
@@ -115,10 +113,10 @@ def test_portions_do_not_change_later_paths():
     def later(portion):
         runs, best, found = runs_on(walled()), None, []
         for _ in range(60_000 // portion):
-            if (chain := runs.run(portion, best)) is not None:
-                found.append(chain)
-                best = chain.length if best is None else best
-        return [chain.poses.tobytes() for chain in found]
+            if (path := runs.run(portion, best)) is not None:
+                found.append(path)
+                best = path.length if best is None else best
+        return [path.waypoints.tobytes() for path in found]
 
     few, many = later(50), later(5)
     assert few[:len(many)] == many[:len(few)]
@@ -132,8 +130,8 @@ def test_no_path_is_as_long_as_the_limit(weight):
     same = finished(search_on(walled(), weight=weight, limit=free.length + 1e-6))
     assert same.length == pytest.approx(free.length)
     for limit in (free.length, 0.95 * free.length, 0.9 * free.length):
-        chain = finished(search_on(walled(), weight=weight, limit=limit))
-        assert chain is None or chain.length < limit
+        path = finished(search_on(walled(), weight=weight, limit=limit))
+        assert path is None or path.length < limit
     assert finished(search_on(walled(), weight=weight, limit=20.0)) is None  # the way around is longer
 
 
@@ -152,23 +150,23 @@ def test_goals_with_tolerances(tolerance):
     problem = walled()
     exact = first_path(problem)[0]
     loose = Problem(problem.map, VEHICLE, problem.start, problem.goal, **tolerance)
-    chain = first_path(loose)[0]
-    check(chain, loose)
-    assert chain.length <= 1.02 * exact.length
+    path = first_path(loose)[0]
+    check(path, loose)
+    assert path.length <= 1.02 * exact.length
     if loose.yaw_tolerance == 0:
-        assert tuple(chain.poses[-1]) == problem.goal
+        assert tuple(path.waypoints[-1]) == problem.goal
 
 
 @pytest.mark.parametrize("goal", [(8.0, -8.0, 40.0), (8.0, -8.0, -1000.0)])
 def test_headings_many_turns_beyond_pi(goal):
     problem = walled()
     turned = Problem(problem.map, VEHICLE, (*START[:2], -250.0), goal)
-    chain = first_path(turned)[0]
-    check(chain, turned)
-    assert tuple(chain.poses[-1]) == goal
+    path = first_path(turned)[0]
+    check(path, turned)
+    assert tuple(path.waypoints[-1]) == goal
     near = Problem(problem.map, VEHICLE, (*START[:2], math.remainder(-250.0, math.tau)),
                    (*goal[:2], math.remainder(goal[2], math.tau)))
-    assert first_path(near)[0].length == pytest.approx(chain.length, abs=1e-6)
+    assert first_path(near)[0].length == pytest.approx(path.length, abs=1e-6)
 
 
 def test_an_unreachable_goal_ends_the_runs():
@@ -176,8 +174,8 @@ def test_an_unreachable_goal_ends_the_runs():
     data = np.zeros((20, 20))
     data[:, 13] = 100
     closed = Problem(GridMap(data, 0.25), VEHICLE, (2.5, 2.5, 0.0), (4.5, 2.5, 0.0))
-    chain, runs = first_path(closed, portion=500)
-    assert chain is None
+    path, runs = first_path(closed, portion=500)
+    assert path is None
     assert runs.exhausted
 
 
@@ -190,7 +188,7 @@ def test_a_passage_that_the_vehicle_cannot_turn_into_is_given_up_sooner_where_cr
     expanded = []
     for visit_penalty in (0.0, 1.0):
         search = search_on(problem, arc=0.5, weight=2.0, visit_penalty=visit_penalty)
-        check(finished(search), problem)
+        check(finished(search, 2.0), problem)
         expanded.append(search.expanded)
     assert expanded[1] < 0.85 * expanded[0]
 
@@ -205,9 +203,9 @@ def test_a_run_gives_up_after_so_many_poses():
 def test_each_first_run_solves_the_maze():
     problem = Problem(load_map(maps_directory() / "maze.yaml"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
     for arc, sectors in FIRST_RUNS[:3 if SCALE == 1 else 1]:
-        chain = finished(search_on(problem, arc=arc, sectors=sectors))
-        check(chain, problem)
-        assert chain.length < 32
+        path = finished(search_on(problem, arc=arc, sectors=sectors), problem.vehicle.turning_radius)
+        check(path, problem)
+        assert path.length < 32
 
 
 @pytest.mark.parametrize("side, radius", [(400.0, 0.1), (1000.0, 0.02), (1e6, 0.001)])
@@ -217,8 +215,8 @@ def test_a_lattice_of_more_cells_than_memory(side, radius):
     data[:30, 20] = 100
     vehicle = Vehicle(radius, 0.2)
     problem = Problem(GridMap(data, side / 40), vehicle, (0.3 * side, 0.9 * side, 0.0), (0.7 * side, 0.9 * side, 1.0))
-    chain, _ = first_path(problem)
-    assert chain.length == pytest.approx(0.4 * side, abs=10 * radius)
+    path, _ = first_path(problem)
+    assert path.length == pytest.approx(0.4 * side, abs=10 * radius)
     behind = Problem(problem.map, vehicle, (0.3 * side, 0.3 * side, -1000.0), (0.7 * side, 0.3 * side, 1.0))
     runs = runs_on(behind)
     for _ in range(scaled(20)):
@@ -228,8 +226,8 @@ def test_a_lattice_of_more_cells_than_memory(side, radius):
 def test_a_start_in_the_corner_of_the_lattice_with_a_heading_many_turns_below_0():
     """Its cell is the first one, and no cell comes before that."""
     problem = Problem(GridMap(np.zeros((40, 40)), 0.5), Vehicle(1.0, 0.1), (0.11, 0.11, 0.6 - 40 * math.tau), (15.0, 15.0, 0.0))
-    chain, _ = first_path(problem)
-    check(chain, problem)
+    path, _ = first_path(problem)
+    check(path, problem)
 
 
 def test_the_distances_that_guide_it_are_not_changed():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.cases import chain_over, empty_map, path_of, random_maps, random_pose, random_problem, scaled, search_on
+from support.cases import empty_map, path_over, random_maps, random_pose, random_problem, scaled, search_on
 from support.planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import (
@@ -43,9 +43,9 @@ poses = st.tuples(coordinates, coordinates, st.floats(-7, 7))
 @given(poses, poses, st.floats(0.01, 10))
 def test_shortest_curves_and_their_pieces_hold(start, goal, radius):
     shortest(start, goal, radius).check()
-    chain = chain_over([start, goal, start], radius)
-    path_of(chain, radius).check()
-    path_of(chain.cut(radius, 1.7), radius).check()
+    path = path_over([start, goal, start], radius)
+    path.check()
+    path.cut(1.7).check()
 
 
 @pytest.mark.slow
@@ -102,10 +102,10 @@ def test_cancelled_answers_hold(asked):
 def test_polished_paths_hold(seed):
     rng = np.random.default_rng(seed)
     field = ClearanceField(empty_map(40.0))
-    chain = chain_over([random_pose(rng) for _ in range(5)], VEHICLE.turning_radius)
+    path = path_over([random_pose(rng) for _ in range(5)], VEHICLE.turning_radius)
     for fresh in (True, False):
-        chain = polished(chain, VEHICLE, field, rng, fresh)
-        path_of(chain, VEHICLE.turning_radius).check()
+        path = polished(path, VEHICLE, field, rng, fresh)
+        path.check()
 
 
 def a_problem(seed):
@@ -159,22 +159,33 @@ def moved(pose, x=0.0, theta=0.0):
     return pose[0] + x, pose[1], pose[2] + theta
 
 
-def with_curve(path, index, **changes):
-    curves = list(path.curves)
-    curves[index] = replace(curves[index], **changes)
-    return replace(path, curves=tuple(curves))
+def with_waypoint(path, index, *pose):
+    waypoints = path.waypoints.copy()
+    waypoints[index] = pose
+    return replace(path, waypoints=waypoints)
+
+
+def with_lengths(path, index, *lengths):
+    changed = path.lengths.copy()
+    changed[index + 1] = lengths
+    return replace(path, lengths=changed)
+
+
+def joined(path, curves):
+    return Path.of_curves(path.start, path.end, curves)
 
 
 PATHS = {
-    "a start that is none": ("the start of the path is (nan", lambda p: replace(p, start=(math.nan, 0.0, 0.0))),
-    "an end that is none": ("the end of the path is (0.0, 0.0, inf)", lambda p: replace(p, end=(0.0, 0.0, math.inf))),
-    "a broken curve": ("of curve 1 of the path: its turning radius", lambda p: with_curve(p, 1, radius=-1.0)),
-    "another start": ("the first curve starts at", lambda p: replace(p, start=moved(p.start, x=1e-9))),
-    "another end": ("the path jumps by 1.1e-06 m and", lambda p: replace(p, end=moved(p.end, x=1.1e-6))),
-    "another last heading": ("m and 1.1e-06 rad", lambda p: replace(p, end=moved(p.end, theta=1.1e-6))),
-    "a gap": ("before curve 2 the path jumps by 0.01 m", lambda p: with_curve(p, 2, start=moved(p.curves[2].start, x=0.01))),
-    "a curve left out": ("before curve 1 the path jumps", lambda p: replace(p, curves=p.curves[:1] + p.curves[2:])),
-    "no curves between two poses": ("before curve 0 the path jumps", lambda p: replace(p, curves=())),
+    "a start that is none": ("the start of the path is (nan", lambda p: with_waypoint(p, 0, math.nan, 0.0, 0.0)),
+    "an end that is none": ("the end of the path is (0.0, 0.0, inf)", lambda p: with_waypoint(p, -1, 0.0, 0.0, math.inf)),
+    "a broken curve": ("of curve 1 of the path: its arcs are", lambda p: with_lengths(p, 1, -1.0, 0.0, 0.0)),
+    "no radius": ("of curve 0 of the path: its turning radius", lambda p: replace(p, radius=-1.0)),
+    "another start": ("the first curve starts at", lambda p: Path.of_curves(moved(p.start, x=1e-9), p.end, p.curves)),
+    "another end": ("the path jumps by 1.1e-06 m and", lambda p: with_waypoint(p, -1, *moved(p.end, x=1.1e-6))),
+    "another last heading": ("m and 1.1e-06 rad", lambda p: with_waypoint(p, -1, *moved(p.end, theta=1.1e-6))),
+    "a gap": ("before curve 2 the path jumps by 0.01 m", lambda p: with_waypoint(p, 2, *moved(p.curves[2].start, x=0.01))),
+    "a curve left out": ("before curve 1 the path jumps", lambda p: joined(p, p.curves[:1] + p.curves[2:])),
+    "no curves between two poses": ("no curve leads from", lambda p: joined(p, ())),
 }
 
 
@@ -187,7 +198,7 @@ def test_check_finds_a_path_with(answer, name):
 
 
 def test_a_path_without_curves_stays_where_it_is():
-    Path(START, START, ()).check()
+    Path.of_pose(START).check()
 
 
 def of_another(plan, **changes):
@@ -197,7 +208,7 @@ def of_another(plan, **changes):
 
 def shorter_way(plan):
     """The same plan with a path that its tree does not have."""
-    path = Path(START, GOAL, (shortest(START, GOAL, VEHICLE.turning_radius),))
+    path = path_over([START, GOAL], VEHICLE.turning_radius)
     return replace(plan, path=path, lower_bound=0.0)
 
 
@@ -240,7 +251,7 @@ def test_check_finds_a_plan_whose_tree_or_path_is_broken(answer):
     with pytest.raises(TreeError):
         replace(answer, tree=replace(answer.tree, costs=answer.tree.costs + 1)).check()
     with pytest.raises(PathError):
-        replace(answer, path=replace(answer.path, curves=())).check()
+        replace(answer, path=with_waypoint(answer.path, -1, 0.0, 0.0, 0.0)).check()
 
 
 def test_check_finds_a_failure_with_what_only_a_path_has():

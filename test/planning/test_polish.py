@@ -7,12 +7,11 @@ import pytest
 from support import naive
 from support.cases import (
     SCALE,
-    chain_of,
-    chain_over,
+    arrays_of,
     empty_map,
     field_of,
     finish,
-    path_of,
+    path_over,
     random_maps,
     random_problem,
     scaled,
@@ -38,21 +37,21 @@ def rrt_paths(count, **options):
             continue
         search = finish(search_on(problem, settings))
         if search.path is not None:
-            yield problem, clearance, chain_of(search.path)
+            yield problem, clearance, search.path
 
 
-def polish(chain, vehicle, field, times=1, seed=0):
+def polish(path, vehicle, field, times=1, seed=0):
     """The path polished so often, and its length each time."""
-    rng, lengths = np.random.default_rng(seed), [chain.length]
+    rng, lengths = np.random.default_rng(seed), [path.length]
     for time in range(times):
-        chain = polished(chain, vehicle, field, rng, fresh=time == 0)
-        lengths.append(chain.length)
-    return chain, lengths
+        path = polished(path, vehicle, field, rng, fresh=time == 0)
+        lengths.append(path.length)
+    return path, lengths
 
 
-def check(chain, problem, clearance):
+def check(path, problem, clearance):
     """A drive along the path in small steps: its joints, its turns and its clearance."""
-    path, at = path_of(chain, problem.vehicle.turning_radius), chain.poses[0]
+    at = path.waypoints[0]
     for curve in path.curves:
         assert min(curve.lengths) >= 0
         assert_close(at, curve.start)
@@ -73,35 +72,35 @@ def assert_close(pose, other):
 @pytest.mark.parametrize("options", [{}, {"step_size": 1.5}, {"planner": "rrt_star", "samples": scaled(300, least=50)}])
 def test_a_polished_path_is_as_free_and_never_longer(options):
     gains = []
-    for problem, clearance, chain in rrt_paths(COUNT, **options):
-        shorter, lengths = polish(chain, problem.vehicle, field_of(problem), times=4)
+    for problem, clearance, path in rrt_paths(COUNT, **options):
+        shorter, lengths = polish(path, problem.vehicle, field_of(problem), times=4)
         assert (np.diff(lengths) <= 1e-9).all()
-        assert shorter.poses[[0, -1]].tobytes() == chain.poses[[0, -1]].tobytes()
+        assert shorter.waypoints[[0, -1]].tobytes() == path.waypoints[[0, -1]].tobytes()
         assert shorter.length == pytest.approx(shorter.lengths[1:].sum())
         check(shorter, problem, clearance)
-        ends = (tuple(pose) for pose in chain.poses[[0, -1]].tolist())
+        ends = (tuple(pose) for pose in path.waypoints[[0, -1]].tolist())
         assert shorter.length >= dubins.shortest(*ends, problem.vehicle.turning_radius).length - 1e-9
-        gains.append(1 - shorter.length / chain.length)
+        gains.append(1 - shorter.length / path.length)
     assert len(gains) >= COUNT / 6
     assert np.mean(gains) > 0.02
 
 
 def test_a_path_is_polished_by_the_rng_alone():
-    for problem, _, chain in rrt_paths(COUNT // 6):
-        given = [array.tobytes() for array in chain]
-        once, again, other = (polish(chain, problem.vehicle, field_of(problem), seed=seed)[0] for seed in (1, 1, 2))
-        assert [array.tobytes() for array in once] == [array.tobytes() for array in again]
-        assert len(chain.words) < 4 or once.poses.tobytes() != other.poses.tobytes()
-        assert [array.tobytes() for array in chain] == given
+    for problem, _, path in rrt_paths(COUNT // 6):
+        given = arrays_of(path)
+        once, again, other = (polish(path, problem.vehicle, field_of(problem), seed=seed)[0] for seed in (1, 1, 2))
+        assert arrays_of(once) == arrays_of(again)
+        assert len(path.words) < 4 or once.waypoints.tobytes() != other.waypoints.tobytes()
+        assert arrays_of(path) == given
 
 
 def test_the_numbers_drawn_do_not_depend_on_the_path():
     """So that what is drawn after it is not changed by where the search stood."""
-    field, short = ClearanceField(empty_map()), chain_over([(-8.0, -8.0, 0.0), (8.0, 8.0, 0.0)], 0.5)
+    field, short = ClearanceField(empty_map()), path_over([(-8.0, -8.0, 0.0), (8.0, 8.0, 0.0)], 0.5)
     states = []
-    for chain in (short, chain_over([(-8.0, -8.0, 0.0), (0.0, 5.0, 3.0), (3.0, -5.0, 3.0), (8.0, 8.0, 0.0)], 0.5)):
+    for path in (short, path_over([(-8.0, -8.0, 0.0), (0.0, 5.0, 3.0), (3.0, -5.0, 3.0), (8.0, 8.0, 0.0)], 0.5)):
         rng = np.random.default_rng(1)
-        polished(chain, VEHICLE, field, rng, True)
+        polished(path, VEHICLE, field, rng, True)
         states.append(rng.bit_generator.state["state"])
     assert states[0] == states[1]
 
@@ -109,21 +108,21 @@ def test_the_numbers_drawn_do_not_depend_on_the_path():
 def test_a_loop_on_an_open_field_becomes_the_dubins_curve():
     """With ends that are kept as they are, be their headings given a turn too many."""
     start, goal = (-8.0, -8.0, 7.0), (8.0, 8.0, -7.0)
-    chain = chain_over([start, (-3.0, 6.0, 2.0), (5.0, -6.0, -1.0), (6.0, 5.0, 3.0), goal], 0.5)
+    path = path_over([start, (-3.0, 6.0, 2.0), (5.0, -6.0, -1.0), (6.0, 5.0, 3.0), goal], 0.5)
     direct = dubins.shortest(start, goal, 0.5).length
-    assert chain.length > 1.5 * direct
+    assert path.length > 1.5 * direct
     for seed in range(scaled(20)):
-        shorter, lengths = polish(chain, VEHICLE, ClearanceField(empty_map()), times=6, seed=seed)
+        shorter, lengths = polish(path, VEHICLE, ClearanceField(empty_map()), times=6, seed=seed)
         assert shorter.length == pytest.approx(direct, abs=1e-6)
         assert lengths[-1] >= direct - 1e-9
-        assert tuple(shorter.poses[0]) == start
-        assert tuple(shorter.poses[-1]) == goal
+        assert tuple(shorter.waypoints[0]) == start
+        assert tuple(shorter.waypoints[-1]) == goal
 
 
 def test_the_shortest_path_stays():
-    chain = chain_over([(-8.0, -8.0, 0.5), (8.0, 8.0, 2.0)], 0.5)
-    shorter, _ = polish(chain, VEHICLE, ClearanceField(empty_map()), times=3)
-    assert [array[1:].tobytes() for array in shorter] == [array[1:].tobytes() for array in chain]
+    path = path_over([(-8.0, -8.0, 0.5), (8.0, 8.0, 2.0)], 0.5)
+    shorter, _ = polish(path, VEHICLE, ClearanceField(empty_map()), times=3)
+    assert shorter == path
 
 
 def walled():
@@ -131,18 +130,18 @@ def walled():
     data = np.zeros((200, 200))
     data[:150, 100] = 100
     problem = Problem(GridMap(data, 0.1, (-10.0, -10.0, 0.0)), VEHICLE, (-3.0, 0.0, 1.5), (3.0, 0.0, -1.5))
-    return problem, chain_over([problem.start, (-1.0, 7.0, 0.5), (1.5, 7.0, -0.5), problem.goal], 0.5)
+    return problem, path_over([problem.start, (-1.0, 7.0, 0.5), (1.5, 7.0, -0.5), problem.goal], 0.5)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_shortcut_leads_through_a_thin_wall(seed):
     """The path tightens around its end: what is left above the shortest way of a point around the disc is for the turns."""
-    problem, chain = walled()
-    shorter, lengths = polish(chain, VEHICLE, field_of(problem), times=scaled(8, least=2), seed=seed)
-    assert audit_path(path_of(shorter, 0.5), problem).ok
-    assert path_of(shorter, 0.5).poses(0.01)[:, 1].max() > 5.2
+    problem, path = walled()
+    shorter, lengths = polish(path, VEHICLE, field_of(problem), times=scaled(8, least=2), seed=seed)
+    assert audit_path(shorter, problem).ok
+    assert shorter.poses(0.01)[:, 1].max() > 5.2
     around = 2 * math.hypot(2.85, 5.0)
-    assert around < shorter.length < chain.length - 0.3
+    assert around < shorter.length < path.length - 0.3
     if SCALE == 1:
         assert shorter.length < 1.1 * around
         assert lengths[-2] - lengths[-1] < 0.01
@@ -153,11 +152,11 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
     data = np.zeros((40, 40))
     data[18:22, 18:22] = 100
     problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), Vehicle(0.5, 0.5), (-8.0, 1.501, 0.0), (8.0, 1.501, 0.0))
-    chain = chain_over([problem.start, (-2.0, 1.501, 0.0), (2.0, 1.501, 0.0), problem.goal], 0.5)
-    shorter, _ = polish(chain, problem.vehicle, field_of(problem))
+    path = path_over([problem.start, (-2.0, 1.501, 0.0), (2.0, 1.501, 0.0), problem.goal], 0.5)
+    shorter, _ = polish(path, problem.vehicle, field_of(problem))
     assert shorter.length == pytest.approx(16, abs=1e-9)
     assert len(shorter.words) == 2
-    assert audit_path(path_of(shorter, 0.5), problem).ok
+    assert audit_path(shorter, problem).ok
 
 
 @pytest.mark.parametrize("poses", [
@@ -169,13 +168,13 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
     [(0.0, 0.0, 0.0), (0.0, 0.0, math.tau), (1.0, 0.0, -math.tau)]])
 @pytest.mark.parametrize("seed", range(3))
 def test_poses_that_come_twice_and_curves_of_no_length(poses, seed):
-    chain = chain_over(poses, 0.5)
-    shorter, lengths = polish(chain, VEHICLE, ClearanceField(empty_map()), times=3, seed=seed)
+    path = path_over(poses, 0.5)
+    shorter, lengths = polish(path, VEHICLE, ClearanceField(empty_map()), times=3, seed=seed)
     assert (np.diff(lengths) <= 1e-9).all()
-    assert shorter.poses[[0, -1]].tobytes() == chain.poses[[0, -1]].tobytes()
+    assert shorter.waypoints[[0, -1]].tobytes() == path.waypoints[[0, -1]].tobytes()
     assert shorter.length == pytest.approx(dubins.shortest(poses[0], poses[-1], 0.5).length, abs=1e-6)
-    at = chain.poses[0]
-    for curve in path_of(shorter, 0.5).curves:
+    at = path.waypoints[0]
+    for curve in shorter.curves:
         assert_close(at, curve.start)
         at = naive.drive(curve.start, curve.word, curve.lengths, 0.5)
     assert_close(at, poses[-1])
@@ -184,13 +183,13 @@ def test_poses_that_come_twice_and_curves_of_no_length(poses, seed):
 def test_a_path_of_thousands_of_curves():
     x = np.linspace(-9, 9, scaled(4001, least=401))
     poses = [(float(a), float(b), float(c)) for a, b, c in zip(x, np.sin(x), np.arctan(np.cos(x)), strict=True)]
-    chain = chain_over(poses, 0.5)
-    assert len(chain.words) == len(poses)
-    shorter, _ = polish(chain, VEHICLE, ClearanceField(empty_map()), times=4)
+    path = path_over(poses, 0.5)
+    assert len(path.words) == len(poses)
+    shorter, _ = polish(path, VEHICLE, ClearanceField(empty_map()), times=4)
     direct = dubins.shortest(poses[0], poses[-1], 0.5).length
-    assert direct - 1e-9 <= shorter.length < direct + 0.2 * (chain.length - direct)
-    at = chain.poses[0]
-    for curve in path_of(shorter, 0.5).curves:
+    assert direct - 1e-9 <= shorter.length < direct + 0.2 * (path.length - direct)
+    at = path.waypoints[0]
+    for curve in shorter.curves:
         assert_close(at, curve.start)
         at = naive.drive(curve.start, curve.word, curve.lengths, 0.5)
     assert_close(at, poses[-1])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.cases import SCALE, boxes_grid, chain_over, empty_map, field_of, holed_polygons, maze_grid, scaled, search_on
+from support.cases import SCALE, boxes_grid, empty_map, field_of, holed_polygons, maze_grid, path_over, scaled, search_on
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle
 from dubins_rrt_ros.planning.search import rrt, sampling
@@ -42,7 +42,7 @@ class Drawing:
 
 def line_of(problem, length):
     x, y, theta = problem.start
-    return chain_over([problem.start, (x + length * math.cos(theta), y + length * math.sin(theta), theta)], 0.5)
+    return path_over([problem.start, (x + length * math.cos(theta), y + length * math.sin(theta), theta)], 0.5)
 
 
 @pytest.fixture
@@ -125,15 +125,15 @@ def test_what_is_allowed_follows_the_shortest_path_so_far(never_near):
 def test_a_share_of_samples_is_near_the_path():
     """Most much nearer than a turning radius, all about it, with headings like its own."""
     problem = open_field()
-    chain = chain_over([START, (-6.0, 5.0, 1.0), (2.0, 7.0, -1.0), GOAL], 0.5)
+    path = path_over([START, (-6.0, 5.0, 1.0), (2.0, 7.0, -1.0), GOAL], 0.5)
     drawing = Drawing(problem, heading_sampling="uniform")
-    poses = drawing.sampler.draw(scaled(20_000, least=4000), drawing.from_start, chain)
-    path = chain.at(np.linspace(0, chain.length, 2000), 0.5)
-    beside = np.array([np.hypot(*(path[:, :2] - pose[:2]).T).min() for pose in poses[:2000]])
-    closest = path[[np.hypot(*(path[:, :2] - pose[:2]).T).argmin() for pose in poses[:2000]]]
+    poses = drawing.sampler.draw(scaled(20_000, least=4000), drawing.from_start, path)
+    along = path.at(np.linspace(0, 1, 2000))
+    beside = np.array([np.hypot(*(along[:, :2] - pose[:2]).T).min() for pose in poses[:2000]])
+    closest = along[[np.hypot(*(along[:, :2] - pose[:2]).T).argmin() for pose in poses[:2000]]]
     turned = np.abs(np.remainder(poses[:2000, 2] - closest[:, 2] + math.pi, math.tau) - math.pi)
     near = (beside < 0.1) & (turned < 0.3)
-    uniform = 0.2 * chain.length / 400 * 0.3 / math.pi
+    uniform = 0.2 * path.length / 400 * 0.3 / math.pi
     assert 0.3 * sampling.NEAR_SHARE < near.mean() - uniform < 1.2 * sampling.NEAR_SHARE
     assert np.ptp(closest[near, 0]) > 8
 

@@ -7,7 +7,6 @@ import pytest
 from support import naive
 from support.cases import (
     SCALE,
-    chain_of,
     contents,
     field_of,
     finish,
@@ -235,12 +234,12 @@ def test_the_tree_holds_the_path_that_polishing_made(step, problems):
     """In edges no longer than the step; and the start is where it was."""
     problem = problems["maze"]
     search = searched(problem, step_size=step, samples=1)
-    chain = chain_of(search.path)
+    path = search.path
     clearance = naive_clearance(problem.map)
-    assert search.length == pytest.approx(chain.length, rel=1e-12)
-    assert tuple(chain.poses[0]) == problem.start
-    assert tuple(chain.poses[-1]) == problem.goal
-    assert clearance(chain.poses[:, :2]).min() >= problem.vehicle.robot_radius
+    assert search.length == pytest.approx(path.length, rel=1e-12)
+    assert tuple(path.waypoints[0]) == problem.start
+    assert tuple(path.waypoints[-1]) == problem.goal
+    assert clearance(path.waypoints[:, :2]).min() >= problem.vehicle.robot_radius
     if step:
-        assert chain.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
-        assert len(chain.words) > 25
+        assert path.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
+        assert len(path.words) > 25

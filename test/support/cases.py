@@ -11,8 +11,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.planning import GridMap, Path, PolygonMap, Problem, Vehicle, World, _kernels, kernels_compiled
-from dubins_rrt_ros.planning.curves.chain import Chain
-from dubins_rrt_ros.planning.curves.dubins import WORDS, DubinsCurve, shortest
+from dubins_rrt_ros.planning.curves.dubins import shortest
 from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
 from dubins_rrt_ros.planning.search.rrt import Search
 from support import naive
@@ -152,25 +151,14 @@ def contents(search):
     return [*(getattr(search.tree, name).tobytes() for name in names), search.path and search.path.poses(0.1).tobytes()]
 
 
-def chain_of(path):
-    """A path as arrays."""
-    poses = [curve.start for curve in path.curves] + [path.end]
-    words = [0] + [WORDS.index(curve.word) for curve in path.curves]
-    lengths = [(0.0, 0.0, 0.0)] + [curve.lengths for curve in path.curves]
-    return Chain(np.array(poses), np.array(words, np.int8), np.array(lengths))
-
-
-def path_of(chain, radius):
-    """The path that arrays hold."""
-    poses = [tuple(pose) for pose in chain.poses.tolist()]
-    curves = zip(poses[:-1], chain.words[1:], chain.lengths[1:].tolist(), strict=True)
-    return Path(poses[0], poses[-1], tuple(DubinsCurve(pose, radius, WORDS[word], tuple(arcs)) for pose, word, arcs in curves))
-
-
-def chain_over(poses, radius):
+def path_over(poses, radius):
     """The shortest curves from pose to pose."""
-    curves = tuple(shortest(*pair, radius) for pair in pairwise(poses))
-    return chain_of(Path(poses[0], poses[-1], curves))
+    return Path.of_curves(poses[0], poses[-1], [shortest(*pair, radius) for pair in pairwise(poses)])
+
+
+def arrays_of(path):
+    """All that a path is made of, as bytes."""
+    return [array.tobytes() for array in (path.waypoints, path.words, path.lengths)]
 
 
 def interpreted(name):

@@ -365,7 +365,8 @@ def stamped(pose: tuple[float, float, float], frame: str = "map") -> PoseStamped
 def driven(poses: np.ndarray, curvature: float) -> Path:
     """The path of (n, 3) poses, each of them reached from the one before straight ahead or by a turn of this curvature [1/m]."""
     rows = list(map(tuple, poses.tolist()))
-    return Path(rows[0], rows[-1], tuple(_piece(*pair, 1 / curvature if curvature else FLAT) for pair in pairwise(rows)))
+    radius = 1 / curvature if curvature else FLAT
+    return Path.of_curves(rows[0], rows[-1], [_piece(*pair, radius) for pair in pairwise(rows)])
 
 
 def _piece(start: tuple, end: tuple, radius: float) -> DubinsCurve:

@@ -162,8 +162,8 @@ def _outcome_without_path(reach: float) -> Outcome:
 
 
 def _turned(answer: Plan) -> float:
-    arcs = (arc for curve in answer.path.curves for turn, arc in zip(curve.word, curve.lengths, strict=True) if turn != "S")
-    return sum(arcs) / (math.tau * answer.problem.vehicle.turning_radius)
+    turns = (arc.length for curve in answer.path.curves for arc in curve.arcs if arc.curvature != 0)
+    return sum(turns) / (math.tau * answer.problem.vehicle.turning_radius)
 
 
 def _lost(run: Run, what: str) -> tuple[Run, Outcome]:

@@ -1,19 +1,21 @@
 """The audit of curves that are no path, such as the edges of a tree, and of poses: many at once, each on its own."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..curves.dubins import DubinsCurve
-from ..curves.path import Path
 from ..maps.model import GridMap
 from ..problem import Pose, Problem
 from .obstacles import PathsideSquares, obstacles_of
 from .sweep import PRECISION, SHARE, Arcs, Disc, Outline, clearance_findings
-from .verdict import TOLERANCE, apart, broken_parts, driven_arcs, turn_findings
+from .verdict import TOLERANCE, apart, broken_curves, driven_arcs, turn_findings
+
+if TYPE_CHECKING:
+    from ..curves.dubins import DubinsCurve
 
 
-def audit_curves(curves: Sequence[DubinsCurve], ends: Sequence[Pose], problem: Problem) -> tuple[str, ...]:
+def audit_curves(curves: Sequence["DubinsCurve"], ends: Sequence[Pose], problem: Problem) -> tuple[str, ...]:
     """Judge curves that the problem's vehicle shall be able to drive, each from its start to its end.
 
     Returns:
@@ -21,11 +23,10 @@ def audit_curves(curves: Sequence[DubinsCurve], ends: Sequence[Pose], problem: P
     """
     if not curves:
         return ()
-    together = Path(problem.start, problem.start, tuple(curves))
-    if broken := broken_parts(together):
+    if broken := broken_curves(curves):
         return broken
-    _, driven, arcs = driven_arcs(together)
-    findings = list(turn_findings(together, problem))
+    _, driven, arcs = driven_arcs(curves, problem.start)
+    findings = list(turn_findings(curves, problem))
     for i, (end, there) in enumerate(zip(driven, ends, strict=True)):
         off, turned = apart(end, there)
         if not (off <= TOLERANCE and turned <= TOLERANCE):
@@ -37,7 +38,7 @@ def audit_curves(curves: Sequence[DubinsCurve], ends: Sequence[Pose], problem: P
     return tuple(findings)
 
 
-def curve_gap(curve: DubinsCurve, problem: Problem) -> tuple[float, float]:
+def curve_gap(curve: "DubinsCurve", problem: Problem) -> tuple[float, float]:
     """The least gap between the vehicle and the obstacles along a curve, as it was measured, and by how much less it may be [m].
 
     Where there is contact, the gap is that of the first contact found: 0, or for a disc minus how deep it is.
@@ -65,8 +66,8 @@ def clearances(points: np.ndarray, problem: Problem) -> np.ndarray:
     return obstacles_of(problem.map, problem.allow_unknown).distance(*np.asarray(points, dtype=float).T)
 
 
-def _only(curve: DubinsCurve, problem: Problem) -> Arcs:
-    return driven_arcs(Path(curve.start, curve.start, (curve,)))[2]
+def _only(curve: "DubinsCurve", problem: Problem) -> Arcs:
+    return driven_arcs([curve], curve.start)[2]
 
 
 def _own_radius(problem: Problem) -> float:

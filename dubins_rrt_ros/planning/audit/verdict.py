@@ -5,14 +5,19 @@ verdict on clearance holds between samples too: `sweep.py` says how.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..curves.path import Path
 from ..problem import Pose, Problem
 from .obstacles import Obstacles
 from .sweep import Arcs, clearance_findings
+
+if TYPE_CHECKING:
+    from ..curves.dubins import DubinsCurve
+    from ..curves.path import Path
 
 #: How far a curve may end from where the next one begins [m, rad], and relatively how much tighter a turn may be.
 TOLERANCE = 1e-6
@@ -42,7 +47,7 @@ class Audit:
         return "; ".join(self.findings) or "ok"
 
 
-def audit_path(path: Path, problem: Problem, obstacles: Obstacles | None = None) -> Audit:
+def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = None) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance.
 
     Args:
@@ -50,48 +55,44 @@ def audit_path(path: Path, problem: Problem, obstacles: Obstacles | None = None)
         problem: with the map, the vehicle and the ends.
         obstacles: those of the problem's map, where they are at hand, such as a World's.
     """
-    if broken := broken_parts(path):
+    if broken := (*_broken_ends(path), *broken_curves(path.curves)):
         return Audit(broken, 0.0, math.inf)
-    starts, ends, arcs = driven_arcs(path)
+    starts, ends, arcs = driven_arcs(path.curves, path.start)
     too_near, least = clearance_findings(arcs, problem, obstacles=obstacles)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
-                *turn_findings(path, problem), *too_near)
-    turning = [curve.radius for curve in path.curves if _turns(curve)]
-    return Audit(findings, least, 1 / min(turning) if turning else 0.0)
+                *turn_findings(path.curves, problem), *too_near)
+    bends = (abs(arc.curvature) for curve in path.curves for arc in curve.arcs if arc.length > 0)
+    return Audit(findings, least, max(bends, default=0.0))
 
 
-def broken_parts(path: Path) -> tuple[str, ...]:
-    """A sentence for each pose that is none and each curve that cannot be driven."""
-    poses = [f"the path's {name} is {pose}" for name, pose in (("start", path.start), ("end", path.end))
-             if not all(map(math.isfinite, pose))]
-    return (*poses, *(f"curve {i} cannot be driven: start {curve.start}, radius {curve.radius}, lengths {curve.lengths}"
-                 for i, curve in enumerate(path.curves)
+def _broken_ends(path: "Path") -> tuple[str, ...]:
+    """Return a sentence for each end that is no pose."""
+    return tuple(f"the path's {name} is {pose}" for name, pose in (("start", path.start), ("end", path.end))
+                 if not all(map(math.isfinite, pose)))
+
+
+def broken_curves(curves: Sequence["DubinsCurve"]) -> tuple[str, ...]:
+    """Return a sentence for each curve that cannot be driven."""
+    return tuple(f"curve {i} cannot be driven: start {curve.start}, radius {curve.radius}, lengths {curve.lengths}"
+                 for i, curve in enumerate(curves)
                  if not (all(map(math.isfinite, (*curve.start, curve.radius, *curve.lengths)))
-                         and curve.radius > 0 and min(curve.lengths) >= 0)))
+                         and curve.radius > 0 and min(curve.lengths) >= 0))
 
 
-def _turns(curve) -> bool:
-    return any(length > 0 and turn != "S" for turn, length in zip(curve.word, curve.lengths, strict=True))
-
-
-def driven_arcs(path: Path) -> tuple[np.ndarray, np.ndarray, Arcs]:
-    """Starts and ends of the curves, (n, 3) each, and all their arcs; a path without curves is one arc of length 0."""
-    signs = {"L": 1.0, "S": 0.0, "R": -1.0}
-    starts = np.array([curve.start for curve in path.curves]).reshape(-1, 3)
-    curvature = np.array([[signs[turn] / curve.radius for turn in curve.word] for curve in path.curves]).reshape(-1, 3)
-    length = np.array([curve.lengths for curve in path.curves]).reshape(-1, 3)
+def driven_arcs(curves: Sequence["DubinsCurve"], start: Pose) -> tuple[np.ndarray, np.ndarray, Arcs]:
+    """Return (n, 3) starts and (n, 3) driven ends of curves, and all arcs: one of length 0 at `start` where there is no curve."""
+    if not curves:
+        return np.empty((0, 3)), np.empty((0, 3)), Arcs(*(np.array([value]) for value in (*start, 0.0, 0.0)))
+    starts = np.array([curve.start for curve in curves])
+    curvature, length = np.array([curve.arcs for curve in curves]).transpose(2, 1, 0)
     poses = [starts]
-    for arc in range(3):
-        one = Arcs(*poses[-1].T, curvature[:, arc], length[:, arc])
-        poses.append(np.column_stack(one.at(np.arange(len(starts)), length[:, arc])))
-    if not path.curves:
-        x, y, theta = path.start
-        return starts, starts, Arcs(*(np.array([value]) for value in (x, y, theta, 0.0, 0.0)))
-    begins = np.concatenate(poses[:3])
-    return starts, poses[3], Arcs(*begins.T, curvature.T.ravel(), length.T.ravel())
+    for bend, along in zip(curvature, length, strict=True):
+        arc = Arcs(*poses[-1].T, bend, along)
+        poses.append(np.column_stack(arc.at(np.arange(len(starts)), along)))
+    return starts, poses[-1], Arcs(*np.concatenate(poses[:-1]).T, curvature.ravel(), length.ravel())
 
 
-def _start_findings(path: Path, problem: Problem) -> list[str]:
+def _start_findings(path: "Path", problem: Problem) -> list[str]:
     return [] if path.start == problem.start else [f"the path starts at {path.start}, not at {problem.start}"]
 
 
@@ -104,7 +105,7 @@ def goal_findings(end: Pose, problem: Problem, tolerance_xy: float = TOLERANCE, 
             f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"]
 
 
-def _joint_findings(path: Path, starts: np.ndarray, ends: np.ndarray) -> list[str]:
+def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[str]:
     before = np.vstack([[path.start], ends])
     after = np.vstack([starts, [path.end]])
     findings = []
@@ -115,10 +116,10 @@ def _joint_findings(path: Path, starts: np.ndarray, ends: np.ndarray) -> list[st
     return findings
 
 
-def turn_findings(path: Path, problem: Problem) -> list[str]:
+def turn_findings(curves: Sequence["DubinsCurve"], problem: Problem) -> list[str]:
     least = problem.vehicle.turning_radius
     findings = []
-    for i, curve in enumerate(path.curves):
+    for i, curve in enumerate(curves):
         if curve.radius < least * (1 - TOLERANCE):
             findings.append(f"curve {i} turns with a radius of {curve.radius:g} m, tighter than {least:g} m")
     return findings

@@ -7,6 +7,7 @@ RRT and RRT* Using Vehicle Dynamics, with its misprints corrected; `_kernels/dub
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,12 +17,26 @@ from ..problem import Pose
 
 WORDS: tuple[str, ...] = _kernel.WORDS
 
-#: By how much rounding may change a length, as a share of it.
+#: Sides to which the letters of a word turn: left, straight on, right.
+SIDES = {"L": 1, "S": 0, "R": -1}
+#: Relative rounding of a length.
 ROUNDING = 1e-9
 
 
 class CurveError(PlanningError, ValueError):
     """A curve that breaks one of its invariants; the message says which, with its figures."""
+
+
+class Arc(NamedTuple):
+    """A part of a curve that is driven with one steering angle.
+
+    Attributes:
+        curvature: positive to the left, 0 straight on [1/m].
+        length: its length [m].
+    """
+
+    curvature: float
+    length: float
 
 
 @dataclass(frozen=True)
@@ -45,6 +60,11 @@ class DubinsCurve:
         """Its length [m]."""
         first, second, third = self.lengths
         return first + second + third
+
+    @property
+    def arcs(self) -> tuple[Arc, ...]:
+        """The arcs in the order in which they are driven; some may have no length."""
+        return tuple(Arc(SIDES[letter] / self.radius, length) for letter, length in zip(self.word, self.lengths, strict=True))
 
     @property
     def end(self) -> Pose:

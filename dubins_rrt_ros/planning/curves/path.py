@@ -1,52 +1,148 @@
-"""A path: consecutive Dubins curves."""
+"""A path: waypoints, each reached from the one before by a curve."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from .._kernels import dubins as _kernel
 from ..errors import PlanningError
 from ..problem import Pose
-from .dubins import CurveError, DubinsCurve
+from .angles import heading_error, position_error
+from .dubins import WORDS, CurveError, DubinsCurve
 
-#: How far a curve may end from where the next one begins [m, rad].
+#: Maximum distance between the end of a curve and the start of the next [m, rad].
 JOINT = 1e-6
+#: Relative rounding of a length that is a whole number of pieces.
+ROUNDING = 1e-12
 
 
 class PathError(PlanningError, ValueError):
     """A path that breaks one of its invariants; the message says which, with its figures."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Path:
-    """Dubins curves, each beginning where the one before ends.
+    """Waypoints from start to end, each reached from the one before by a curve; `Path.of_curves` makes one of curves.
 
     Attributes:
-        start, end: (x [m], y [m], theta [rad]), exactly as asked for.
-        curves: from start to end; none where the two are the same.
+        waypoints: (n, 3) float64: x [m], y [m], theta [rad]; the first and the last are exactly as asked for.
+        words: (n,) int8: indices into WORDS, of the curves that lead to the waypoints; the first means nothing.
+        lengths: (n, 3) float64: lengths of the arcs of these curves [m]; those of the first mean nothing.
+        radius: turning radius of all curves [m].
     """
 
-    start: Pose
-    end: Pose
-    curves: tuple[DubinsCurve, ...]
+    waypoints: np.ndarray
+    words: np.ndarray
+    lengths: np.ndarray
+    radius: float
+
+    @classmethod
+    def of_curves(cls, start: Pose, end: Pose, curves: Sequence[DubinsCurve]) -> "Path":
+        """Join curves.
+
+        Args:
+            start, end: (x [m], y [m], theta [rad]).
+            curves: those from start to end; none where the two are the same.
+
+        Raises:
+            PathError: the first curve does not begin at the start, one has another radius, or there is none between two poses.
+        """
+        if not curves:
+            if start != end:
+                raise PathError(f"no curve leads from {start} to {end}")
+            return cls.of_pose(start)
+        if curves[0].start != start:
+            raise PathError(f"the first curve starts at {curves[0].start}, not at {start}")
+        radius = curves[0].radius
+        if other := next((curve for curve in curves if curve.radius != radius), None):
+            raise PathError(f"one curve of the path has a turning radius of {radius} m, and another one of {other.radius} m")
+        return cls(np.array([*(curve.start for curve in curves), end], dtype=float),
+                   np.array([0, *(WORDS.index(curve.word) for curve in curves)], np.int8),
+                   np.array([(0.0, 0.0, 0.0), *(curve.lengths for curve in curves)]), radius)
+
+    @classmethod
+    def of_pose(cls, pose: Pose, radius: float = math.inf) -> "Path":
+        """Return the path that stays at a pose."""
+        return cls(np.array([pose], dtype=float), np.zeros(1, np.int8), np.zeros((1, 3)), radius)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Path):
+            return NotImplemented
+        return bool(np.array_equal(self.waypoints, other.waypoints) and np.array_equal(self.words[1:], other.words[1:])
+                    and np.array_equal(self.lengths[1:], other.lengths[1:])
+                    and (self.radius == other.radius or len(self.waypoints) == 1))
+
+    def __hash__(self) -> int:
+        return hash((self.start, self.end, len(self.waypoints)))
+
+    @property
+    def start(self) -> Pose:
+        """The pose at which it starts."""
+        return _pose(self.waypoints[0])
+
+    @property
+    def end(self) -> Pose:
+        """The pose at which it ends."""
+        return _pose(self.waypoints[-1])
+
+    @cached_property
+    def curves(self) -> tuple[DubinsCurve, ...]:
+        """The curves from start to end; none where the two are the same."""
+        rows = zip(self.waypoints[:-1].tolist(), self.words[1:].tolist(), self.lengths[1:].tolist(), strict=True)
+        return tuple(DubinsCurve(tuple(start), self.radius, WORDS[word], tuple(arcs)) for start, word, arcs in rows)
 
     @property
     def length(self) -> float:
-        """Its length [m]."""
-        total = 0.0  # not sum(), which compensates for rounding since Python 3.12 and so differs from the tree's costs
-        for curve in self.curves:
-            total += curve.length
-        return total
+        """The length [m]."""
+        first, second, third = self.lengths.T
+        lengths = first + second + third
+        lengths[0] = 0.0
+        return float(np.cumsum(lengths)[-1])  # which adds in the order of the tree's costs, as sum() does not
 
     def poses(self, spacing: float) -> np.ndarray:
         """(n, 3) float64 poses at most `spacing` [m] apart; start, end and every joint between two arcs are among them."""
         if not self.curves:
-            return np.array([self.start])
+            return self.waypoints.copy()
         parts = [curve.poses(spacing) for curve in self.curves]
-        for part, following in zip(parts, self.curves[1:], strict=False):
-            part[-1] = following.start
-        parts[-1][-1] = self.end
+        for part, end in zip(parts, self.waypoints[1:], strict=True):
+            part[-1] = end
         return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+
+    def at(self, shares: np.ndarray) -> np.ndarray:
+        """(n, 3) poses at (n,) shares of the length, each in [0, 1]; headings in [-pi, pi]."""
+        lengths = self.lengths[1:].sum(axis=1)
+        ends = np.cumsum(lengths)
+        arc_lengths = shares * self.lengths[1:].sum()
+        curves = np.minimum(np.searchsorted(ends, arc_lengths), len(ends) - 1)
+        out = np.empty((len(arc_lengths), 3))
+        _kernel.chain_poses(self.waypoints, self.words, self.lengths, self.radius, curves,
+                            arc_lengths - np.append(0.0, ends)[curves], out)
+        return out
+
+    def cut(self, longest: float) -> "Path":
+        """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited."""
+        if longest == 0 or len(self.words) < 2:
+            return self
+        pieces = [self._pieces(i, longest) for i in range(1, len(self.words))]
+        return Path(np.concatenate([self.waypoints[:1], *(ends for ends, _ in pieces)]),
+                    np.concatenate([self.words[:1], *(np.full(len(ends), word, np.int8)
+                                                      for word, (ends, _) in zip(self.words[1:], pieces, strict=True))]),
+                    np.concatenate([self.lengths[:1], *(lengths for _, lengths in pieces)]), self.radius)
+
+    def _pieces(self, i: int, longest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ends of the pieces of the curve to waypoint `i`, and the lengths of their arcs."""
+        lengths = self.lengths[i]
+        count = max(1, math.ceil(lengths.sum() / longest * (1 - ROUNDING)))
+        bounds = lengths.sum() * np.arange(count + 1) / count
+        ends = np.empty((count + 1, 3))
+        _kernel.poses_along(*self.waypoints[i - 1], self.radius, self.words[i], *lengths, bounds, ends)
+        ends[-1] = self.waypoints[i]
+        before = np.concatenate([[0.0], np.cumsum(lengths)])
+        within = np.clip(bounds[:, None], before[:-1], before[1:]) - before[:-1]
+        return ends[1:], np.diff(within, axis=0)
 
     def check(self) -> None:
         """Check the invariants: those of each curve, and that they lead from the start to the end without a jump.
@@ -62,15 +158,16 @@ class Path:
                 curve.check()
             except CurveError as error:
                 raise PathError(f"of curve {i} of the path: {error}") from None
-        self._check_joints()
+        for i, curve in enumerate(self.curves):
+            self._check_joint(i, curve.end)
 
-    def _check_joints(self) -> None:
-        # What is published begins with the first curve's own start.
-        if self.curves and self.curves[0].start != self.start:
-            raise PathError(f"the first curve starts at {self.curves[0].start}, not at {self.start}")
-        before = [self.start, *(curve.end for curve in self.curves)]
-        after = [*(curve.start for curve in self.curves), self.end]
-        for i, (a, b) in enumerate(zip(before, after, strict=True)):
-            off, turned = math.dist(a[:2], b[:2]), abs(math.remainder(a[2] - b[2], math.tau))
-            if not (off <= JOINT and turned <= JOINT):
-                raise PathError(f"before curve {i} the path jumps by {off:.3g} m and {turned:.3g} rad to {b}")
+    def _check_joint(self, i: int, driven: Pose) -> None:
+        end = _pose(self.waypoints[i + 1])
+        off, turned = position_error(driven, end), heading_error(driven, end)
+        if not (off <= JOINT and turned <= JOINT):
+            raise PathError(f"before curve {i + 1} the path jumps by {off:.3g} m and {turned:.3g} rad to {end}")
+
+
+def _pose(row: np.ndarray) -> Pose:
+    x, y, theta = row.tolist()
+    return x, y, theta

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ..curves.angles import wrap
 from ..problem import Problem
 from ..settings import Settings
 from .cost_to_go import DistanceField
@@ -41,4 +42,4 @@ class Headings:
         if self._kind == "mixed":
             led += rng.normal(0, SPREAD, len(positions))
             led[rng.random(len(positions)) < UNIFORM_SHARE] = math.nan
-        return np.where(np.isnan(led), uniform, np.remainder(led + math.pi, math.tau) - math.pi)
+        return np.where(np.isnan(led), uniform, wrap(led))

@@ -7,7 +7,8 @@ import numpy as np
 
 from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
-from ..curves.chain import Chain
+from ..curves.angles import wrap
+from ..curves.path import Path
 from ..problem import Problem
 from ..settings import Settings
 from .cost_to_go import DistanceField
@@ -56,7 +57,7 @@ class HybridAStarRuns:
         """Whether the run begun last has ended."""
         return self._current is None
 
-    def run(self, expansions: int, best: float | None) -> Chain | None:
+    def run(self, expansions: int, best: float | None) -> Path | None:
         """Expand so many poses.
 
         Args:
@@ -71,14 +72,14 @@ class HybridAStarRuns:
         self._current.run(expansions)
         if not self._current.ended:
             return None
-        path = self._current.path()
+        arrays = self._current.path()
         self._current = None
-        chain = Chain(*path) if path else None
-        if chain and best is not None and self._settings.shortcut:
+        path = Path(*arrays, self._problem.vehicle.turning_radius) if arrays else None
+        if path and best is not None and self._settings.shortcut:
             for fresh in (True, False):
-                chain = polished(chain, self._problem.vehicle, self._field, self._rng, fresh)
-        self._count(chain is not None and (best is None or chain.length < best), best is None)
-        return chain
+                path = polished(path, self._problem.vehicle, self._field, self._rng, fresh)
+        self._count(path is not None and (best is None or path.length < best), best is None)
+        return path
 
     def _count(self, improved: bool, first: bool) -> None:
         """Count how many runs in a row were in vain."""
@@ -110,5 +111,5 @@ def _goals(problem: Problem) -> np.ndarray:
         return np.array([problem.goal])
     turns = problem.yaw_tolerance * np.linspace(-1, 1, HEADINGS_AT_GOAL + 1)[1:]
     goals = np.tile(problem.goal, (len(turns) + 1, 1))
-    goals[1:, 2] = np.remainder(goals[1:, 2] + turns + math.pi, math.tau) - math.pi
+    goals[1:, 2] = wrap(goals[1:, 2] + turns)
     return goals

@@ -35,7 +35,6 @@ from .._kernels import COMPILED
 from .._kernels.rrt import RrtKernel
 from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
-from ..curves.chain import Chain
 from ..curves.path import Path
 from ..problem import Problem
 from ..settings import Settings
@@ -44,7 +43,7 @@ from .cost_to_go import DistanceField
 from .hybrid_astar import HybridAStarRuns
 from .sampling import Sampler
 from .smoothing import polished
-from .tree import Tree
+from .tree import Tree, path_to
 
 NEAR_FACTOR = math.e * (1 + 1 / 3)
 MOST_NEAR = 512
@@ -124,11 +123,7 @@ class Search:
     @property
     def path(self) -> Path | None:
         """The best path so far, or None; the tree is not copied for it."""
-        if self.best < 0:
-            return None
-        grown = self._tree
-        arrays = (np.asarray(view) for view in (grown.poses, grown.parents, grown.costs, grown.words, grown.lengths))
-        return Tree(grown.radius, *arrays).path_to(self.best)
+        return path_to(self.best, self._tree) if self.best >= 0 else None
 
     @property
     def done(self) -> bool:
@@ -185,7 +180,7 @@ class Search:
         if self._settings.planner == "rrt_star":
             self._bound_from_start = self._beside.start(lambda: DistanceField.from_start(problem, field).make_bound())
 
-    def _take(self, found: Chain | None) -> None:
+    def _take(self, found: Path | None) -> None:
         """Add a path that hybrid A* found to the tree, if it is the best."""
         if found is not None and (self.best < 0 or found.length < self.length):
             self._adopt(found)
@@ -194,7 +189,7 @@ class Search:
         fresh = self._polishings == POLISHINGS
         self._polishings -= 1
         before = self.length
-        shorter = self._polished(self._best_chain(), fresh)
+        shorter = self._polished(self.path, fresh)
         if shorter.length < before:
             self._adopt(shorter, self.best)
         self._is_polished = before - self.length <= WORTH_MORE * before
@@ -204,7 +199,7 @@ class Search:
             self._aim_below_best()
         self._is_news = False
         if self._used == len(self._block):
-            self._block = self._sampler.draw(BLOCK, self._from_start, self._best_chain() if self.best >= 0 else None)
+            self._block = self._sampler.draw(BLOCK, self._from_start, self.path)
             self._used = 0
         left = self._settings.samples - self.samples
         begin, end = self._used, min(self._used + min(self._batch, left), len(self._block))
@@ -241,11 +236,12 @@ class Search:
             expansions = EXPANSIONS_BESIDE_OF_POLYGON if self._problem.vehicle.footprint else EXPANSIONS_BESIDE
             self._portion = self._beside.start(self._runs.run, expansions, self.length)
 
-    def _adopt(self, chain: Chain, end: int = -1) -> None:
+    def _adopt(self, path: Path, end: int = -1) -> None:
         """Add a path to the tree; `end` is the node at its end, if the tree has it."""
         if end < 0 and self.best >= 0 and self._problem.exact_goal:
             end = self.best
-        self._grower.insert_path(*chain.cut(self._tree.radius, self._settings.step_size), end)
+        pieces = path.cut(self._settings.step_size)
+        self._grower.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
         self._look_for_best()
 
     def _look_for_best(self) -> None:
@@ -272,13 +268,5 @@ class Search:
             wanted[[0, self.best]] = True
             self._tree.prune_index(wanted.astype(np.int8))
 
-    def _polished(self, chain: Chain, fresh: bool) -> Chain:
-        return polished(chain, self._problem.vehicle, self._field, self._rng, fresh)
-
-    def _best_chain(self) -> Chain:
-        nodes, node = [], self.best
-        while node >= 0:
-            nodes.append(node)
-            node = self._tree.parents[node]
-        nodes.reverse()
-        return Chain(*(np.asarray(view)[nodes] for view in (self._tree.poses, self._tree.words, self._tree.lengths)))
+    def _polished(self, path: Path, fresh: bool) -> Path:
+        return polished(path, self._problem.vehicle, self._field, self._rng, fresh)

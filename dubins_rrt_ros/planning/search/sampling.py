@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from ..collision.clearance import ClearanceField
-from ..curves.chain import Chain
+from ..curves.angles import wrap
+from ..curves.path import Path
 from ..problem import Problem
 from ..settings import Settings
 from .cost_to_go import DistanceField
@@ -39,7 +40,7 @@ class Sampler:
         corners = problem.map.corners()
         self._corner, self._sides = corners[0], corners[[1, 3]] - corners[0]
 
-    def draw(self, count: int, from_start: DistanceField | None = None, best: Chain | None = None) -> np.ndarray:
+    def draw(self, count: int, from_start: DistanceField | None = None, best: Path | None = None) -> np.ndarray:
         """(count, 3) float64 poses: x [m], y [m], theta [rad].
 
         Args:
@@ -82,13 +83,13 @@ class Sampler:
         drawn = self._squares[self._rng.integers(len(self._squares), size=count)]
         return self._to_goal.points_in(drawn, self._rng.random((count, 2)))
 
-    def _near(self, best: Chain, count: int) -> np.ndarray:
+    def _near(self, best: Path, count: int) -> np.ndarray:
         """(count, 3) poses near a path."""
         radius = self._problem.vehicle.turning_radius
-        poses = best.at(self._rng.random(count) * best.length, radius)
+        poses = best.at(self._rng.random(count))
         size = np.exp(-NEAR_FINENESS * self._rng.random(count))
         poses[:, :2] += (NEAR_DISTANCE * radius * size)[:, None] * self._rng.normal(size=(count, 2))
-        poses[:, 2] = np.remainder(poses[:, 2] + NEAR_ANGLE * size * self._rng.normal(size=count) + math.pi, math.tau) - math.pi
+        poses[:, 2] = wrap(poses[:, 2] + NEAR_ANGLE * size * self._rng.normal(size=count))
         return poses
 
     def _goals(self, count: int) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 
 from .._kernels.shortcut import Shortcutter
 from ..collision.clearance import ClearanceField
-from ..curves.chain import Chain
+from ..curves.path import Path
 from ..vehicle import Vehicle
 
 #: How many changes are tried in one go.
@@ -13,15 +13,15 @@ TRIES = 512
 FRESH, KNOWN = 0.8, 0.3
 
 
-def polished(chain: Chain, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, fresh: bool) -> Chain:
+def polished(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, fresh: bool) -> Path:
     """A path with the same ends that is never longer.
 
     Args:
-        chain: it is free for the vehicle; so is the answer.
+        path: it is free for the vehicle; so is the answer.
         fresh: whether it was not polished before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    polisher = Shortcutter(field.body(vehicle), vehicle.turning_radius, *chain, TRIES)
+    polisher = Shortcutter(field.body(vehicle), path.radius, path.waypoints, path.words, path.lengths, TRIES)
     polisher.improve(draws, FRESH if fresh else KNOWN)
     arrays = (np.array(view[:polisher.count]) for view in (polisher.poses, polisher.words, polisher.lengths))
-    return Chain(*arrays)
+    return Path(*arrays, path.radius)

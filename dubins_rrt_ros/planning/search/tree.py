@@ -60,12 +60,7 @@ class Tree:
 
     def path_to(self, node: int) -> Path:
         """The path from the start to `node`."""
-        end = tuple(self.poses[node].tolist())
-        curves = []
-        while node != 0:
-            curves.append(self.curve_to(node))
-            node = self.parents[node]
-        return Path(tuple(self.poses[0].tolist()), end, tuple(reversed(curves)))
+        return path_to(node, self)
 
     def segments(self, spacing: float, most: int | None = None) -> np.ndarray:
         """(m, 2, 2) float64: ends (x, y) [m] of the straight pieces that draw all edges; turns in pieces of `spacing` [m].
@@ -118,3 +113,13 @@ class Tree:
             raise TreeError(f"the edge to node {node} ends at {end}, not at ({x}, {y}, {theta})")
         if field is not None and not field.curve_is_free(curve, vehicle):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
+
+
+def path_to(node: int, tree: Tree | SearchTree) -> Path:
+    """Return the path from the start to a node; nothing else of the tree is copied."""
+    nodes = []
+    while node >= 0:
+        nodes.append(node)
+        node = tree.parents[node]
+    nodes.reverse()
+    return Path(*(np.asarray(array)[nodes] for array in (tree.poses, tree.words, tree.lengths)), tree.radius)
