@@ -2,7 +2,6 @@
 
 import array
 import math
-import struct
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +48,7 @@ def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovariance
 def pose_message(pose: Pose) -> PoseMessage:
     """An (x, y, yaw) as a message, with w >= 0 in its quaternion."""
     message = PoseMessage()
-    _fill(message, *_rows(np.array([pose]))[0].tolist())
+    _fill(message, *planar_rows(np.array([pose]))[0].tolist())
     return message
 
 
@@ -57,8 +56,8 @@ def transformed(pose: PoseMessage, transform: Transform) -> PoseMessage:
     """A pose in the frame that a transform leads to, as tf2 has it: rotate, then translate."""
     t, p, q = transform.translation, pose.position, pose.orientation
     turn = _Quaternion(*(getattr(transform.rotation, axis) for axis in "wxyz"))
-    x, y, z = (turn * _Quaternion(0.0, p.x, p.y, p.z) * turn.conjugate)[1:]
-    w, i, j, k = turn * _Quaternion(q.w, q.x, q.y, q.z)
+    x, y, z = _product(_product(turn, _Quaternion(0.0, p.x, p.y, p.z)), turn.conjugate)[1:]
+    w, i, j, k = _product(turn, _Quaternion(q.w, q.x, q.y, q.z))
     return PoseMessage(position=Point(x=x + t.x, y=y + t.y, z=z + t.z), orientation=Quaternion(w=w, x=i, y=j, z=k))
 
 
@@ -68,14 +67,15 @@ class _Quaternion(NamedTuple):
     y: float
     z: float
 
-    def __mul__(self, other: "_Quaternion") -> "_Quaternion":
-        a, b = self, other
-        return _Quaternion(a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-                           a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w)
-
     @property
     def conjugate(self) -> "_Quaternion":
         return _Quaternion(self.w, -self.x, -self.y, -self.z)
+
+
+def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    """Return the Hamilton product: the turn `b`, then the turn `a`."""
+    return _Quaternion(a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w)
 
 
 def poses_of(plan: Plan | None) -> np.ndarray:
@@ -86,7 +86,7 @@ def poses_of(plan: Plan | None) -> np.ndarray:
 def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
     """(n, 3) poses as a path; without poses it is empty and tells that there is none."""
     message = PathMessage(header=Header(stamp=stamp, frame_id=frame))
-    for row in _rows(poses).tolist():
+    for row in planar_rows(poses).tolist():
         stamped = PoseStamped()
         stamped.header = message.header
         _fill(stamped.pose, *row)
@@ -94,24 +94,8 @@ def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
     return message
 
 
-def serialized_path(poses: np.ndarray, frame: str, stamp: Time) -> bytes:
-    """`path_message` as it goes over the wire, in CDR: ten thousand poses in 3 ms and not in 100, while nobody is answered."""
-    name = frame.encode() + b"\0"
-    header = struct.pack("<iII", stamp.sec, stamp.nanosec, len(name)) + name
-    begin = header + bytes(-len(header) % 4) + struct.pack("<I", len(poses))
-    numbers = np.zeros((len(poses), 7))
-    numbers[:, [0, 1, 5, 6]] = _rows(poses)
-    # Doubles are aligned to 8 bytes, which the first pose need not begin at; all others do.
-    aligned = header + bytes(-len(header) % 8)
-    others = np.empty((max(0, len(poses) - 1), len(aligned) + 8 * 7), np.uint8)
-    others[:, :len(aligned)] = np.frombuffer(aligned, np.uint8)
-    others[:, len(aligned):] = numbers[1:].view(np.uint8)
-    first = header + bytes(-len(begin + header) % 8) if len(poses) else b""
-    return b"\0\1\0\0" + begin + first + numbers[:1].tobytes() + others.tobytes()
-
-
-def _rows(poses: np.ndarray) -> np.ndarray:
-    """Of each pose x, y and the quaternion's z, w; in a field they must be Python floats: a numpy number goes out as garbage."""
+def planar_rows(poses: np.ndarray) -> np.ndarray:
+    """Return x, y and the quaternion's z, w of each pose, (n, 4); a message's fields take them as Python floats alone."""
     x, y, yaw = np.asarray(poses, dtype=float).reshape(-1, 3).T
     half = (yaw - 2 * math.pi * np.round(yaw / (2 * math.pi))) / 2
     return np.stack([x, y, np.sin(half), np.cos(half)], axis=1)

@@ -85,7 +85,7 @@ def _spin(executor: SingleThreadedExecutor, node: PlannerNode) -> None:
         except Exception as error:  # of any kind: the node lives on
             if not rclpy.ok():  # a signal came while something was published, which then fails
                 raise ExternalShutdownException from error
-            node.tell_defect(error)
+            node.report_defect(error)
 
 
 def _configured_node(arguments: list[str]) -> PlannerNode:

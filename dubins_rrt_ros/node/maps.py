@@ -1,251 +1,197 @@
-"""The map that is planned on: from a file, from the topic, or by service."""
+"""The map that is planned on, from a file, the topic or a service; and the world that is prepared from it."""
 
 import queue
 from collections.abc import Callable
 from concurrent import futures
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from nav_msgs.msg import OccupancyGrid
-from nav_msgs.srv import GetMap, LoadMap
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.task import Future
 
-from dubins_rrt_ros.planning import (
-    GridMap,
-    Map,
-    MapError,
-    MapMetadataError,
-    MapNotFound,
-    Vehicle,
-    World,
-    load_map,
-    prepare,
-)
+from dubins_rrt_ros.planning import GridMap, Map, MapError, Vehicle, World, load_map, prepare
 from dubins_rrt_ros.planning.collision.footprint import summary
 from dubins_rrt_ros.planning.maps.locate import find_map
 
 from .conversions import as_grid, grid_from, grid_message
-from .mailbox import Mailbox
+from .executor_queue import ExecutorQueue
 from .parameters import NodeOptions, Parameters
-from .qos import LATCHED, VOLATILE, map_misfits
+from .qos import LATCHED, VOLATILE
 from .worker import Worker
 
-#: How long a signal may go unnoticed while the first map is loaded, and how often it is said that it still is [s].
-LOADING_INTERVAL, WAITING_INTERVAL = 0.25, 5.0
+#: Time between two checks for a signal while the first map is loaded [s].
+LOADING_INTERVAL = 0.25
+#: Time between two log lines that it is still loaded [s].
+STILL_LOADING_INTERVAL = 5.0
 
-
-@dataclass(frozen=True, eq=False)
-class MapInUse:
-    """A map that is planned on: the map, and the same as a grid, as it is published."""
-
-    map: Map
-    grid: GridMap
-
-
-@dataclass(eq=False)
-class Preparation:
-    """What plan() needs of a map, for one vehicle.
-
-    Attributes:
-        map, inscribed_radius, allow_unknown: what it is for.
-        previous: a world that was prepared before, from which what did not change is taken over; None once this one is there, so
-            that it is not kept alive any longer.
-        world: what is prepared; cancelled where that was not needed any more.
-        is_wanted: whether a request waits for it, which it does not any more once there is a newer map.
-    """
-
-    map: Map
-    inscribed_radius: float
-    allow_unknown: bool
-    previous: World | None
-    world: "futures.Future[World]" = field(default_factory=futures.Future)
-    is_wanted: bool = False
+#: A map, and the same as the grid that is published of it.
+Loaded = tuple[Map, GridMap]
 
 
 class Maps:
-    """Keeps the newest map and prepares it in a thread of its own; the services load_map and get_map.
+    """Keeps the newest map, and prepares it in a thread of its own.
+
+    Attributes:
+        map: what is planned on; None until there is one.
+        grid: the same as a grid.
+        refusal: a sentence, with a space in front, that says why the last map was refused; "" where it was taken.
 
     Args:
-        node, parameters, mailbox: the node's.
+        node, parameters, queue: the node's.
         on_news: called in the executor's thread when a map was taken or refused.
-        on_prepared: called there when the newest is prepared.
+        on_prepared: called there when the newest map is prepared.
 
     Raises:
         MapError: the parameter map_file names no map that can be used.
     """
 
-    def __init__(self, node: Node, parameters: Parameters, mailbox: Mailbox, on_news: Callable[[], None],
+    def __init__(self, node: Node, parameters: Parameters, queue: ExecutorQueue, on_news: Callable[[], None],
                  on_prepared: Callable[[], None]):
-        self._node = node
-        self._parameters = parameters
-        self._mailbox = mailbox
-        self._on_news, self._tell_prepared = on_news, on_prepared
+        self._node, self._parameters, self._queue = node, parameters, queue
+        self._on_news, self._on_prepared = on_news, on_prepared
         self._frame = self._options.global_frame
-        self._refused = ""  # why the last one was refused
-        self.worker = Worker("maps")
-        self.current: MapInUse | None = None
-        self._preparation: Preparation | None = None
-        self._publisher = None
+        self.map: Map | None = None
+        self.grid: GridMap | None = None
+        self.refusal = ""
+        self._worker = Worker("maps")
+        self._world: futures.Future[World] = futures.Future()  # of the newest map
+        self._world_is_of: tuple[Map, float, bool] | None = None  # map, inscribed radius and allow_unknown
+        self._world_is_wanted = False  # by a request, whatever map comes next
+        self._last_world: World | None = None  # that was prepared; the worker's own
+        self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED) if self._options.map_file else None
         if self._options.map_file:
-            self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED)
-            self._take(*self._load_first(self._options.map_file))
+            self.take(*self._load_first(self._options.map_file))
         else:
             qos = LATCHED if self._options.map_transient_local else VOLATILE
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
-        node.create_service(LoadMap, "~/load_map", self._on_load_map, callback_group=ReentrantCallbackGroup())
-        node.create_service(GetMap, "~/get_map", self._on_get_map)
 
     @property
     def _options(self) -> NodeOptions:
         return self._parameters.read().node
 
-    @property
-    def id(self) -> str:
-        """Of the current map, "" where there is none."""
-        return "" if self.current is None else self.current.map.id
-
-    def missing(self) -> str:
-        """Where there is no map yet: on what it waits, why none comes, and what to do."""
-        topic = self._node.resolve_topic_name("map")
-        found = map_misfits(self._node.get_publishers_info_by_topic(topic), self._options.map_transient_local)
-        remedy = " and ".join(found) or "publish it, set map_file or call ~/load_map"
-        return f"There is no map yet, waiting for one on {topic}: {remedy}.{self._refused}"
+    # Worlds
 
     @property
     def is_prepared(self) -> bool:
-        """Whether requests can be planned on the current map without delay."""
-        return self.current is not None and self.prepared().world.done()
+        """True if requests can be planned on the newest map without delay."""
+        return self.map is not None and self._newest_world().done()
 
-    def prepared(self) -> Preparation:
-        """The preparation of the current map for the present vehicle, begun if it was not."""
-        now = self._parameters.read()
-        wanted = self.current.map, now.vehicle.inscribed_radius, now.problem["allow_unknown"]
-        last = self._preparation
-        if last is None or (last.map, last.inscribed_radius, last.allow_unknown) != wanted:
-            self._preparation = Preparation(*wanted, _prepared_before(last))
-            self.worker.submit(partial(self._prepare, self._preparation, now.vehicle), partial(self._post, self._on_prepared))
-        return self._preparation
+    def world_for_request(self) -> "futures.Future[World]":
+        """Return the world of the newest map, as it will be: for this request it is prepared even if another map comes first."""
+        world = self._newest_world()
+        self._world_is_wanted = True
+        return world
 
-    def _load_first(self, name: str) -> tuple[Map, GridMap]:
-        """Load the map that the node begins with; a signal ends the wait for it."""
-        loaded: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.worker.submit(lambda cancelled: self._load(name, ""), loaded.put)
-        while (outcome := _within(LOADING_INTERVAL, loaded)) is None:
-            if not self._node.context.ok():
-                raise ExternalShutdownException
-            self._node.get_logger().info(f"Still loading the map {name}", throttle_duration_sec=WAITING_INTERVAL)
+    def _newest_world(self) -> "futures.Future[World]":
+        """Return the world of the newest map for the present vehicle; it is prepared if it was not asked for before."""
+        if self.map is not None:
+            now = self._parameters.read()
+            allow_unknown = now.problem["allow_unknown"]
+            wanted = self.map, now.vehicle.inscribed_radius, allow_unknown
+            if self._world_is_of != wanted:
+                self._renew_world()
+                self._world_is_of = wanted
+                self._worker.submit(partial(self._prepare, self._world, self.map, now.vehicle, allow_unknown),
+                                    partial(self._post, self._end_preparation))
+        return self._world
+
+    def _renew_world(self) -> None:
+        if not self._world_is_wanted:
+            self._world.cancel()  # if it is not being prepared yet
+        self._world, self._world_is_wanted = futures.Future(), False
+
+    def _prepare(self, world: "futures.Future[World]", world_map: Map, vehicle: Vehicle, allow_unknown: bool,
+                 cancelled: Callable[[], bool]) -> World | None:
+        if not world.set_running_or_notify_cancel():
+            return None
+        try:
+            world_map.id  # noqa: B018 - takes long for a large map, and is kept
+            # The last one, from which what did not change is taken over, is not kept any longer.
+            last, self._last_world = self._last_world, None
+            self._last_world = prepare(world_map, vehicle, allow_unknown, last)
+        except Exception as error:
+            world.set_exception(error)  # which a request reports
+            raise
+        world.set_result(self._last_world)
+        return self._last_world
+
+    def _end_preparation(self, outcome: World | Exception | None) -> None:
         if isinstance(outcome, Exception):
             raise outcome
-        return outcome
+        if outcome is not None and self._world.done() and outcome is self._world.result():
+            outline = self._parameters.read().vehicle.footprint
+            vehicle = f", for {summary(outline)}" if outline else ""
+            self._node.get_logger().info(f"The map is ready, id {outcome.map.id}{vehicle}")
+            self._on_prepared()
 
-    def _load(self, name: str, directory: str) -> tuple[Map, GridMap]:
-        """Load a map by its name, from within a directory; "" is any."""
-        loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells, map_directory=directory)
-        return loaded, as_grid(loaded)
+    # Maps
+
+    def take(self, world_map: Map, grid: GridMap) -> None:
+        """Plan on this map, which looks like this grid, from now on."""
+        self.map, self.grid, self.refusal = world_map, grid, ""
+        height, width = grid.data.shape
+        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {world_map.name}")
+        self._newest_world()
+        if self._publisher is not None:
+            self._publisher.publish(self.message(grid))
+        self._queue.post(self._on_news)
+
+    def refuse(self, error: MapError) -> None:
+        """Report why a map cannot be used; the one before stays."""
+        self.refusal = f" The last one was refused: {error}."
+        self._node.get_logger().error(f"A map was refused: {error}")
+        self._queue.post(self._on_news)
+
+    def load(self, name: str, directory: str, on_end: Callable[[Loaded | Exception], None]) -> None:
+        """Load a map in the worker's thread.
+
+        Args:
+            name: a file, its URL, or the name of an installed map.
+            directory: where the file must be; "" is anywhere.
+            on_end: called in the executor's thread with the map, or with why there is none.
+        """
+        self._worker.submit(lambda cancelled: self._load(name, directory), partial(self._post, on_end))
+
+    def message(self, grid: GridMap) -> OccupancyGrid:
+        """Return a grid as a message that is stamped now."""
+        return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
+
+    def close(self) -> None:
+        """End the thread; a preparation under way cannot be cancelled and ends with the process."""
+        self._worker.close(0.0)
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
             grid = grid_from(message, self._frame, self._options.max_map_cells)
         except MapError as error:
-            self._refuse(error)
+            self.refuse(error)
         else:
-            self._take(grid, grid)
+            self.take(grid, grid)
 
-    def _refuse(self, error: MapError) -> None:
-        self._refused = f" The last one was refused: {error}."
-        self._node.get_logger().error(f"A map was refused: {error}")
-        self._mailbox.post(self._on_news)
-
-    def _take(self, taken: Map, grid: GridMap) -> None:
-        """Plan on this from now on."""
-        self.current = MapInUse(taken, grid)
-        self._refused = ""
-        height, width = grid.data.shape
-        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {taken.name}")
-        self.prepared()
-        if self._publisher is not None:
-            self._publisher.publish(self._message(grid))
-        self._mailbox.post(self._on_news)
-
-    def _prepare(self, preparation: Preparation, vehicle: Vehicle, cancelled: Callable[[], bool]) -> Preparation:
-        try:
-            if preparation.is_wanted or preparation.map is self.current.map:
-                preparation.map.id  # noqa: B018 - of a large map it takes long, and is kept
-                preparation.world.set_result(prepare(preparation.map, vehicle, preparation.allow_unknown, preparation.previous))
-        except Exception as error:
-            preparation.world.set_exception(error)  # which a request says
-            raise
-        finally:
-            preparation.previous = None
-            preparation.world.cancel()  # where it was left out
-        return preparation
-
-    def _on_prepared(self, outcome: Preparation | Exception) -> None:
+    def _load_first(self, name: str) -> Loaded:
+        """Load the map that the node begins with; a signal ends the wait for it."""
+        loaded: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._worker.submit(lambda cancelled: self._load(name, ""), loaded.put)
+        while (outcome := _next_of(loaded, LOADING_INTERVAL)) is None:
+            if not self._node.context.ok():
+                raise ExternalShutdownException
+            self._node.get_logger().info(f"Still loading the map {name}", throttle_duration_sec=STILL_LOADING_INTERVAL)
         if isinstance(outcome, Exception):
             raise outcome
-        if outcome is self._preparation:
-            outline = self._parameters.read().vehicle.footprint
-            vehicle = f", for {summary(outline)}" if outline else ""
-            self._node.get_logger().info(f"The map is ready, id {outcome.map.id}{vehicle}")
-            self._tell_prepared()
+        return outcome
 
-    def _post(self, receiver: Callable, outcome: object) -> None:
-        self._mailbox.post(partial(receiver, outcome))
+    def _load(self, name: str, directory: str) -> Loaded:
+        loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells, map_directory=directory)
+        return loaded, as_grid(loaded)
 
-    async def _on_load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
-        loaded = Future()
-        directory = self._options.map_directory
-        self.worker.submit(lambda cancelled: self._load(request.map_url, directory), partial(self._post, loaded.set_result))
-        outcome = await loaded
-        response.result = _result(outcome)
-        if response.result == LoadMap.Response.RESULT_SUCCESS:
-            self._take(*outcome)
-            response.map = self._message(self.current.grid)
-        elif isinstance(outcome, MapError):
-            self._refuse(outcome)
-        else:
-            self._mailbox.post(partial(_raise, outcome))  # a defect: told where all are, and the caller is answered
-        return response
-
-    def _on_get_map(self, request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
-        if self.current is None:
-            self._node.get_logger().warning(f"get_map gives an empty map: {self.missing()}")
-            response.map.header.frame_id = self._frame
-        else:
-            response.map = self._message(self.current.grid)
-        return response
-
-    def _message(self, grid: GridMap) -> OccupancyGrid:
-        return grid_message(grid, self._frame, self._node.get_clock().now().to_msg())
+    def _post(self, receiver: Callable[[Any], None], outcome: object) -> None:
+        self._queue.post(partial(receiver, outcome))
 
 
-def _prepared_before(last: Preparation | None) -> World | None:
-    """The newest world that is prepared, as far as the last preparation knows."""
-    if last is None or not last.world.done():
-        return None if last is None else last.previous
-    return None if last.world.cancelled() or last.world.exception() else last.world.result()
-
-
-def _within(timeout: float, results: queue.SimpleQueue) -> Any:
-    """What comes within `timeout` [s], or None."""
+def _next_of(results: "queue.SimpleQueue[Any]", timeout: float) -> Any:
+    """Return what comes within `timeout` [s], or None."""
     try:
         return results.get(timeout=timeout)
     except queue.Empty:
         return None
-
-
-def _result(outcome: object) -> int:
-    """LoadMap's result code for what came of it."""
-    codes = {MapNotFound: LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST,
-             MapMetadataError: LoadMap.Response.RESULT_INVALID_MAP_METADATA,
-             MapError: LoadMap.Response.RESULT_INVALID_MAP_DATA,
-             Exception: LoadMap.Response.RESULT_UNDEFINED_FAILURE}
-    return next((code for kind, code in codes.items() if isinstance(outcome, kind)), LoadMap.Response.RESULT_SUCCESS)
-
-
-def _raise(error: Exception) -> None:
-    raise error

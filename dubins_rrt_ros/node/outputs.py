@@ -1,10 +1,11 @@
 """What the node says: path, status, tree, diagnostics and log."""
 
 import time
+from typing import Any
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Path as PathMessage
-from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -13,27 +14,31 @@ from visualization_msgs.msg import MarkerArray
 
 from dubins_rrt_ros.planning import Plan, Status
 
-from .conversions import path_message, poses_of, serialized_path, status_message
+from .cdr import serialized_path
+from .conversions import path_message, poses_of, status_message
+from .executor_queue import steady_timer
 from .markers import tree_markers
+from .outcome import Outcome
 from .parameters import Parameters
 from .qos import LATCHED
 
-#: How often the last status is repeated on /diagnostics [s].
+#: Time between two messages on /diagnostics, which repeat the last status [s].
 DIAGNOSTICS_INTERVAL = 1.0
-#: The tree of a path that is still improved is shown at most once in this time [s], and with so many lines at most; while
-#: they are built and sent, which takes 10 ms a thousand, the node answers nobody.
-TREE_INTERVAL, GROWING_TREE = 1.0, 2_000
-#: The most lines of a tree whose request has ended.
+#: Minimum time between two trees of a request under way [s].
+TREE_INTERVAL = 1.0
+#: Maximum number of lines of such a tree: a thousand take 10 ms to build and send, in which the node answers nobody.
+GROWING_TREE = 2_000
+#: Maximum number of lines of a tree whose request has ended.
 FINAL_TREE = 10_000
 
 
 class Outputs:
-    """The node's publishers, but for the map's. Only the executor's thread may use them.
+    """The node's publishers, but for the map's, and its log of events. Only the executor's thread may use them.
 
     Attributes:
         shown: the plan whose path and tree are on display, if there is one.
-        status: what was told last, if anything was.
-        tells_of_no_request: whether that was about a map or a start that is missing or was refused.
+        status: of the last event; None before the first.
+        plan_id: of the request that it was about, 0 for none.
     """
 
     def __init__(self, node: Node, parameters: Parameters, frame: str):
@@ -46,19 +51,25 @@ class Outputs:
         self._tree = node.create_publisher(MarkerArray, "~/tree", LATCHED,
                                            event_callbacks=PublisherEventCallbacks(matched=self._on_tree_matched))
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
-        self._told: DiagnosticStatus | None = None
-        self._timer = node.create_timer(DIAGNOSTICS_INTERVAL, self._diagnose, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._event: DiagnosticStatus | None = None
+        self._timer = steady_timer(node, DIAGNOSTICS_INTERVAL, self._diagnose)
         self.shown: Plan | None = None
         self.status: Status | None = None
-        self.tells_of_no_request = False
+        self.plan_id = 0
         self._tree_due = 0.0
         self._tree_is_clear = True
 
-    def answer(self, status: Status, message: str, plan: Plan | None, *, last: bool, **ids) -> None:
-        """Say how a goal stands: with its path, or an empty one in place of what was published before, status and tree."""
-        is_new = plan is None or self.shown is None or plan.problem is not self.shown.problem
-        self._show_path(plan)
-        self.tell(status, message, plan, last=last, **ids)
+    def answer(self, outcome: Outcome, *, last: bool, plan_id: int, revision: int, map_id: str) -> None:
+        """Publish how a goal stands: its path, or an empty one in place of what was published before, status and tree.
+
+        Args:
+            outcome: the path, or why there is none.
+            last: True if the request has ended; that is logged too.
+            plan_id, revision, map_id: as in `report`.
+        """
+        is_new = outcome.plan is None or self.shown is None or outcome.plan.problem is not self.shown.problem
+        self._show_path(outcome.plan)
+        self.report(outcome, log=last, plan_id=plan_id, revision=revision, map_id=map_id)
         if last or is_new or time.monotonic() >= self._tree_due:
             self._show_tree(FINAL_TREE if last else GROWING_TREE)
 
@@ -67,50 +78,56 @@ class Outputs:
         self._show_path(None)
         self._show_tree(FINAL_TREE)
 
+    def path(self, plan: Plan | None) -> PathMessage:
+        """Return the path of a plan as a message, empty where there is none."""
+        return path_message(poses_of(plan), self._frame, self._now())
+
+    def report(self, outcome: Outcome, *, log: bool = True, plan_id: int = 0, revision: int = 0, map_id: str = "") -> None:
+        """Publish an event as status.
+
+        Args:
+            outcome: what happened.
+            log: True if it goes to the log too.
+            plan_id, revision: which answer to which request; 0 where it belongs to none.
+            map_id: the newest map's; the plan's own takes precedence.
+        """
+        status, message, plan = outcome
+        self.status, self.plan_id = status, plan_id
+        self._event = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
+                                     map_id=map_id if plan is None else plan.problem.map.id)
+        self._status.publish(self._event)
+        if log:
+            self._log(self._event)
+
     def _show_path(self, plan: Plan | None) -> None:
         self.shown = plan
         self._path.publish(serialized_path(poses_of(plan), self._frame, self._now()))
 
-    def path(self, plan: Plan | None) -> PathMessage:
-        """The path of a plan as a message, empty where there is none."""
-        return path_message(poses_of(plan), self._frame, self._now())
-
-    def tell(self, status: Status, message: str, plan: Plan | None = None, *, last: bool = True, plan_id: int = 0,
-             revision: int = 0, map_id: str = "") -> None:
-        """Publish an event as status; the `last` of a request is logged too."""
-        self.status = status
-        self.tells_of_no_request = status is Status.NO_MAP or (plan_id == 0 and status is not Status.NONE)
-        self._told = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
-                                    map_id=map_id if plan is None else plan.problem.map.id)
-        self._status.publish(self._told)
-        if last:
-            self._log(self._told)
-
-    def _log(self, told: DiagnosticStatus) -> None:
+    def _log(self, event: DiagnosticStatus) -> None:
         # Three calls: rclpy binds a severity to the line that logs.
-        if told.level == DiagnosticStatus.OK:
-            self._node.get_logger().info(told.message)
-        elif told.level == DiagnosticStatus.ERROR:
-            self._node.get_logger().error(told.message)
+        if event.level == DiagnosticStatus.OK:
+            self._node.get_logger().info(event.message)
+        elif event.level == DiagnosticStatus.ERROR:
+            self._node.get_logger().error(event.message)
         else:
-            self._node.get_logger().warning(told.message)
+            self._node.get_logger().warning(event.message)
 
     def _diagnose(self) -> None:
-        told = [] if self._told is None else [self._told]
-        self._diagnostics.publish(DiagnosticArray(header=Header(stamp=self._now()), status=told))
+        events = [] if self._event is None else [self._event]
+        self._diagnostics.publish(DiagnosticArray(header=Header(stamp=self._now()), status=events))
 
-    def _show_tree(self, most: int) -> None:
-        """Show the tree to those who look; clear it where there is none or it is not wanted any more."""
+    def _show_tree(self, max_lines: int) -> None:
+        """Publish the tree where somebody subscribes; clear it where there is none or it is not wanted any more."""
         self._tree_due = time.monotonic() + TREE_INTERVAL
         plan = self.shown if self._parameters.read().node.publish_tree else None
         if self._tree.get_subscription_count() and not (plan is None and self._tree_is_clear):
-            self._tree.publish(tree_markers(plan, self._frame, self._now(), most))
+            self._tree.publish(tree_markers(plan, self._frame, self._now(), max_lines))
             self._tree_is_clear = plan is None
 
-    def _on_tree_matched(self, matched) -> None:
+    def _on_tree_matched(self, matched: Any) -> None:
         """Show the last tree to a subscriber that came after it: nobody built it then."""
         if matched.current_count_change > 0:
             self._show_tree(FINAL_TREE)
 
-    def _now(self):
+    def _now(self) -> Time:
         return self._node.get_clock().now().to_msg()

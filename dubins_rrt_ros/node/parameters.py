@@ -100,7 +100,7 @@ class Parameters:
 
     def _check_together(self, wanted: Mapping[str, Any]) -> None:
         try:
-            configuration(self._values() | wanted)
+            configuration({**self._values(), **wanted})
         except OptionError as error:
             if len(wanted) > 1:
                 raise
@@ -127,9 +127,11 @@ def descriptor(item: Option) -> ParameterDescriptor:
     result = ParameterDescriptor(name=item.name, description=item.describe(), read_only=item.name in READ_ONLY,
                                  additional_constraints=item.allowed() if item.choices else read_only(item.name),
                                  dynamic_typing=True)  # so that 1 is taken where 1.0 is meant
+    if item.low is None or item.high is None:
+        return result
     if item.type is float:
         result.floating_point_range = [FloatingPointRange(from_value=float(item.low), to_value=float(item.high))]
-    elif item.type is int:
+    else:
         result.integer_range = [IntegerRange(from_value=item.low, to_value=item.high)]
     return result
 

@@ -1,35 +1,37 @@
-"""The quality of service of the node's topics, and what does not fit it."""
+"""The quality of service of the node's topics, and publishers whose offer does not match it."""
 
 from collections.abc import Callable, Iterable
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+#: What is of interest now alone: poses.
 VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+#: What whoever subscribes later gets too.
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def misfits(publishers: Iterable[TopicEndpointInfo], kind: str) -> list[str]:
-    """Why nothing comes from the publishers of a topic, a clause with its remedy for each that does not fit.
+def incompatible_publishers(publishers: Iterable[TopicEndpointInfo], kind: str) -> list[str]:
+    """Say for each incompatible publisher of a topic why nothing comes from it, in a clause with the remedy.
 
     Args:
         publishers: all that there are.
         kind: the topic's type, such as geometry_msgs/msg/PoseStamped.
     """
-    return _clauses(publishers, lambda publisher: _misfit(publisher, kind))
+    return _clauses(publishers, lambda publisher: _incompatibility(publisher, kind))
 
 
-def map_misfits(publishers: Iterable[TopicEndpointInfo], transient_local: bool) -> list[str]:
-    """The same for the map's topic, where `transient_local` tells what durability the parameter map_transient_local asks for."""
-    return _clauses(publishers, lambda publisher: _misfit(publisher, "nav_msgs/msg/OccupancyGrid")
-                    or _durability_misfit(publisher, transient_local))
+def incompatible_map_publishers(publishers: Iterable[TopicEndpointInfo], transient_local: bool) -> list[str]:
+    """Say the same of the map's publishers, where `transient_local` is the value of the parameter map_transient_local."""
+    return _clauses(publishers, lambda publisher: _incompatibility(publisher, "nav_msgs/msg/OccupancyGrid")
+                    or _durability_incompatibility(publisher, transient_local))
 
 
-def _clauses(publishers: Iterable[TopicEndpointInfo], misfit: Callable[[TopicEndpointInfo], str]) -> list[str]:
-    return [f"{_name(publisher)} {why}" for publisher in publishers if (why := misfit(publisher))]
+def _clauses(publishers: Iterable[TopicEndpointInfo], reason: Callable[[TopicEndpointInfo], str]) -> list[str]:
+    return [f"{_name(publisher)} {why}" for publisher in publishers if (why := reason(publisher))]
 
 
-def _misfit(publisher: TopicEndpointInfo, kind: str) -> str:
+def _incompatibility(publisher: TopicEndpointInfo, kind: str) -> str:
     if publisher.topic_type != kind:
         return f"publishes {publisher.topic_type} there, not {kind}; give one of them another name"
     if publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT:
@@ -37,7 +39,7 @@ def _misfit(publisher: TopicEndpointInfo, kind: str) -> str:
     return ""
 
 
-def _durability_misfit(publisher: TopicEndpointInfo, transient_local: bool) -> str:
+def _durability_incompatibility(publisher: TopicEndpointInfo, transient_local: bool) -> str:
     offered = publisher.qos_profile
     if transient_local and offered.durability == DurabilityPolicy.VOLATILE:
         return "offers it with volatile durability, which does not fit; set map_transient_local to false"

@@ -22,7 +22,7 @@ class Refusal(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Request:
+class PlanRequest:
     """What to plan.
 
     Attributes:

@@ -15,7 +15,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from dubins_rrt_ros.node import maps as module
-from dubins_rrt_ros.node.mailbox import Mailbox
+from dubins_rrt_ros.node.executor_queue import ExecutorQueue
 from dubins_rrt_ros.node.maps import Maps
 from dubins_rrt_ros.node.parameters import Parameters
 from dubins_rrt_ros.planning import GridMap, prepare
@@ -32,9 +32,9 @@ class Keeper:
 
     def __init__(self, executor, node):
         self._executor = executor
-        self._maps = Maps(node, Parameters(node), Mailbox(node), lambda: None, lambda: self._heard.append(self._name))
+        self._maps = Maps(node, Parameters(node), ExecutorQueue(node), lambda: None, lambda: self._heard.append(self._name))
         self._name, self._heard = "", []
-        self.worker = self._maps.worker
+        self.worker = self._maps._worker
         self.made = []
 
     def prepare(self, map, vehicle, allow_unknown, previous):
@@ -45,7 +45,7 @@ class Keeper:
         """Take a map; a weak reference to it."""
         grid = GridMap(np.zeros((10, 10)), 0.1, name=name)
         self._name = name
-        self._maps._take(grid, grid)
+        self._maps.take(grid, grid)
         return weakref.ref(grid)
 
     def wait(self):

@@ -1,13 +1,15 @@
-"""From any thread to the executor's, in which alone the node publishes."""
+"""Calls from any thread to the executor's, in which alone the node publishes; and the timers of that thread."""
 
 import queue
 import threading
 from collections.abc import Callable
 
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.timer import Timer
 
 
-class Mailbox:
+class ExecutorQueue:
     """Calls that any thread posts and the executor's thread makes, in order."""
 
     def __init__(self, node: Node):
@@ -17,7 +19,7 @@ class Mailbox:
         self._posted = node.create_guard_condition(self._make_calls)
 
     def post(self, call: Callable[[], None]) -> None:
-        """Have this called in the executor's thread; nothing is, once the mailbox is closed."""
+        """Have this called in the executor's thread; once the queue is closed, it is not called."""
         with self._posting:
             if not self._closed:
                 self._calls.put(call)
@@ -35,4 +37,9 @@ class Mailbox:
                 call()
             finally:
                 if not self._calls.empty():
-                    self._posted.trigger()  # what a defect leaves behind is called too
+                    self._posted.trigger()  # the calls behind a defect are made too
+
+
+def steady_timer(node: Node, interval: float, callback: Callable[[], None]) -> Timer:
+    """Call back every `interval` [s] of real time, also where the node's clock is a simulation's."""
+    return node.create_timer(interval, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))

@@ -9,7 +9,8 @@ from builtin_interfaces.msg import Time
 from nav_msgs.msg import Path
 from rclpy.serialization import deserialize_message
 
-from dubins_rrt_ros.node.conversions import path_message, serialized_path
+from dubins_rrt_ros.node.cdr import serialized_path
+from dubins_rrt_ros.node.conversions import path_message
 
 STAMP = Time(sec=12, nanosec=34)
 

@@ -1,0 +1,109 @@
+"""From a start and a goal to a request that a worker serves, and back to the executor with its outcome."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from dubins_rrt_ros.planning import Map, Plan, Pose, Problem
+
+from .executor_queue import ExecutorQueue
+from .maps import Maps
+from .outcome import Outcome, outcome_of
+from .parameters import Parameters
+from .request import PlanRequest
+from .worker import Job, Worker
+
+#: Called in the executor's thread with the id of a request and its outcome.
+OnEnd = Callable[[int, Outcome], None]
+#: Called there with the id of a request and its best plan so far.
+OnImprovement = Callable[[int, Plan], None]
+#: Time that each worker gets to act on its cancellation at shutdown [s].
+SHUTDOWN_TIMEOUT = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Submission:
+    """A request under way.
+
+    Attributes:
+        job: cancels it alone.
+        outcome: to be awaited in the executor's thread; its result is the `Outcome`.
+    """
+
+    job: Job
+    outcome: Future
+
+
+class Dispatcher:
+    """Makes requests from the newest map and the present parameters, and has workers serve them.
+
+    Attributes:
+        goals: the worker for goals by topic, of which the newest counts.
+        services: the worker for services, which are all answered, in order; so neither waits for the other.
+    """
+
+    def __init__(self, node: Node, parameters: Parameters, maps: Maps, queue: ExecutorQueue):
+        self._node, self._parameters, self._maps, self._queue = node, parameters, maps, queue
+        self.goals, self.services = Worker("goals"), Worker("services")
+        self._newest_id = 0
+        self._under_way: dict[int, Submission] = {}
+
+    def new_id(self) -> int:
+        """Return the plan_id of a new request."""
+        self._newest_id += 1
+        return self._newest_id
+
+    def request(self, plan_id: int, world_map: Map, start: Pose, goal: Pose, **options: Any) -> PlanRequest:
+        """Make a request.
+
+        Args:
+            plan_id: from `new_id`.
+            world_map: the newest map.
+            start, goal: in its frame.
+            options: of `Problem`, where they differ from the parameters.
+
+        Raises:
+            OptionError: an option is out of range.
+            InvalidPose: a pose cannot be used.
+        """
+        now = self._parameters.read()
+        problem = Problem(world_map, now.vehicle, start, goal, **{**now.problem, **options})
+        return PlanRequest(plan_id, problem, now.settings, self._maps.world_for_request(), now.node.check_invariants)
+
+    def submit(self, worker: Worker, request: PlanRequest, on_end: OnEnd,
+               on_improvement: OnImprovement | None = None) -> Submission:
+        """Have a worker serve a request after what it was given before.
+
+        Args:
+            worker: `goals` or `services`.
+            request: what to plan.
+            on_end: called once.
+            on_improvement: called for the better paths meanwhile.
+        """
+        improved = None if on_improvement is None else partial(self._post, on_improvement, request.id)
+        job = worker.submit(partial(request.serve, improved), partial(self._post, self._end, request.id, on_end))
+        self._under_way[request.id] = submission = Submission(job, Future())
+        return submission
+
+    def _post(self, call: Callable[..., None], *arguments: object) -> None:
+        self._queue.post(partial(call, *arguments))
+
+    def _end(self, plan_id: int, on_end: OnEnd, result: Plan | Exception) -> None:
+        outcome = outcome_of(result, self._node)
+        self._under_way.pop(plan_id).outcome.set_result(outcome)
+        on_end(plan_id, outcome)
+
+    def cancel_all(self) -> list[Submission]:
+        """Cancel all requests and return them; each still has an outcome."""
+        self.goals.cancel_all()
+        self.services.cancel_all()
+        return list(self._under_way.values())
+
+    def close(self) -> None:
+        """Cancel all requests and end the workers."""
+        for worker in (self.goals, self.services):
+            worker.close(SHUTDOWN_TIMEOUT)

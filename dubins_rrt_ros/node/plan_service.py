@@ -1,0 +1,48 @@
+"""The service get_plan: a plan between the two poses of each request, beside the goals."""
+
+from nav_msgs.srv import GetPlan
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+
+from dubins_rrt_ros.planning import OptionError, Status
+
+from .dispatcher import Dispatcher
+from .frames import Frames
+from .outcome import Outcome, outcome_of
+from .outputs import Outputs
+from .readiness import Readiness
+from .request import PlanRequest, Refusal
+
+
+class PlanService:
+    """Answers ~/get_plan, each request in its turn; the node does not wait for it."""
+
+    def __init__(self, node: Node, dispatcher: Dispatcher, readiness: Readiness, frames: Frames, outputs: Outputs,
+                 group: CallbackGroup):
+        self._node, self._dispatcher, self._readiness = node, dispatcher, readiness
+        self._frames, self._outputs = frames, outputs
+        node.create_service(GetPlan, "~/get_plan", self._on_request, callback_group=group)
+
+    async def _on_request(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
+        plan_id = self._dispatcher.new_id()
+        try:
+            submission = self._dispatcher.submit(self._dispatcher.services, self._plan_request(plan_id, request), self._end)
+        except Exception as error:
+            outcome = outcome_of(error, self._node)
+            self._end(plan_id, outcome)
+        else:
+            outcome = await submission.outcome
+        response.plan = self._outputs.path(outcome.plan)
+        return response
+
+    def _plan_request(self, plan_id: int, request: GetPlan.Request) -> PlanRequest:
+        world_map = self._readiness.require_map()
+        start, goal = self._frames.pose("start", request.start), self._frames.pose("goal", request.goal)
+        options = {} if request.tolerance == 0 else {"goal_tolerance_xy": request.tolerance}
+        try:
+            return self._dispatcher.request(plan_id, world_map, start, goal, **options)
+        except OptionError as error:
+            raise Refusal(Status.INVALID_POSE, f"The tolerance of the request cannot be used: {error}") from None
+
+    def _end(self, plan_id: int, outcome: Outcome) -> None:
+        self._outputs.report(outcome, plan_id=plan_id, revision=1, map_id=self._readiness.map_id)

@@ -1,0 +1,143 @@
+"""What the node needs before it can plan: which of it is missing, why, and what would bring it."""
+
+from rclpy.node import Node
+
+from dubins_rrt_ros.planning import Map, Pose, Status
+
+from .maps import Maps
+from .outcome import Outcome
+from .outputs import Outputs
+from .parameters import Parameters
+from .qos import incompatible_map_publishers, incompatible_publishers
+from .request import Refusal
+
+#: The topics of a start, and their types.
+START_TOPICS = {"start_pose": "geometry_msgs/msg/PoseStamped", "initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped"}
+
+
+class Readiness:
+    """Keeps the start, knows whether map or start are missing, and reports that in log and status.
+
+    Attributes:
+        start: where the vehicle is, in the global frame; None until a start has come that could be used and transformed.
+    """
+
+    def __init__(self, node: Node, parameters: Parameters, maps: Maps, outputs: Outputs):
+        self._node, self._parameters, self._maps, self._outputs = node, parameters, maps, outputs
+        self.start: Pose | None = None
+        self._start_refusal = ""  # why the last start was refused
+        self._reported = ""  # what is missing, as it was logged last
+
+    # What planning needs
+
+    def require_map(self) -> Map:
+        """Return the newest map.
+
+        Raises:
+            Refusal: there is none.
+        """
+        if self._maps.map is None:
+            raise Refusal(Status.NO_MAP, self.missing_map())
+        return self._maps.map
+
+    def require_start(self) -> Pose:
+        """Return the start.
+
+        Raises:
+            Refusal: there is none.
+        """
+        if self.start is None:
+            raise Refusal(Status.NO_START, f"There is no start to plan from: {self._remedy_for_start()}")
+        return self.start
+
+    @property
+    def map_id(self) -> str:
+        """The id of the newest map, "" where there is none."""
+        return "" if self._maps.map is None else self._maps.map.id
+
+    @property
+    def lacks_start_alone(self) -> bool:
+        """True if there is a map and no start."""
+        return self._maps.map is not None and self.start is None
+
+    # What comes
+
+    def take_start(self, start: Pose) -> None:
+        """Plan from here from now on."""
+        self.start = start
+        self._start_refusal = ""
+        self.update()
+
+    def refuse_start(self, outcome: Outcome) -> None:
+        """Report why a start cannot be used, and forget the one before: the vehicle is no longer there."""
+        self.start = None
+        before, self._start_refusal = self._start_refusal, f" The last one was refused: {outcome.message}"
+        self._reported = self._missing()
+        # A stream of them shall not flood the log.
+        self._outputs.report(outcome, log=self._start_refusal != before, map_id=self.map_id)
+
+    def update(self) -> bool:
+        """Log what is missing where that has changed; a missing map is reported as status too. Return True if it changed."""
+        before, self._reported = self._reported, self._missing()
+        if self._reported == before:
+            return False
+        self._log()
+        if self._maps.map is None:
+            self._outputs.report(Outcome(Status.NO_MAP, self._reported), log=False)
+        return True
+
+    def remind(self, is_idle: bool) -> None:
+        """Log again what is missing, and correct the status where what it misses has come since.
+
+        Args:
+            is_idle: True if no goal is planned or waits. The status is corrected then alone, and not when the map or start
+                comes: a goal mostly comes with it.
+        """
+        if not self.update():
+            self._log()
+        if is_idle and self._maps.map is not None:
+            self._correct_status()
+
+    # What is said
+
+    def missing_map(self) -> str:
+        """Return a sentence for when there is no map: which topic should bring it, why it does not, and what to do."""
+        topic = self._node.resolve_topic_name("map")
+        transient_local = self._parameters.read().node.map_transient_local
+        found = incompatible_map_publishers(self._node.get_publishers_info_by_topic(topic), transient_local)
+        remedy = " and ".join(found) or "publish it, set map_file or call ~/load_map"
+        return f"There is no map yet, waiting for one on {topic}: {remedy}.{self._maps.refusal}"
+
+    def _remedy_for_start(self) -> str:
+        topics = {self._node.resolve_topic_name(name): kind for name, kind in START_TOPICS.items()}
+        found = [clause for topic, kind in topics.items()
+                 for clause in incompatible_publishers(self._node.get_publishers_info_by_topic(topic), kind)]
+        but = f"; but {' and '.join(found)}" if found else ""
+        return f"publish the vehicle's pose on {' or '.join(topics)}{but}.{self._start_refusal}"
+
+    def _missing(self) -> str:
+        """Return a sentence on what is missing, "" where nothing is."""
+        if self._maps.map is None:
+            return self.missing_map()
+        return f"Waiting for a start: {self._remedy_for_start()}" if self.start is None else ""
+
+    def _log(self) -> None:
+        if self._maps.map is None:
+            self._node.get_logger().warning(self._reported)
+        elif self._reported:
+            self._node.get_logger().info(self._reported)
+
+    def _correct_status(self) -> None:
+        if self._outputs.status is Status.NO_MAP and self._reported:
+            outcome = Outcome(Status.NO_START, self._reported)
+        elif self._status_is_outdated and not self._reported:
+            outcome = Outcome(Status.NONE, "Ready for a goal.")
+        else:
+            return
+        self._outputs.report(outcome, log=False, map_id=self.map_id)
+
+    @property
+    def _status_is_outdated(self) -> bool:
+        """True if the last status would be another one now that nothing is missing: it is about no request, or about no map."""
+        last = self._outputs
+        return last.status is Status.NO_MAP or (last.plan_id == 0 and last.status not in (None, Status.NONE))
