@@ -87,13 +87,14 @@ def test_each_kind_of_problem_can_be_planned(kind):
 
 @pytest.mark.parametrize("informed", [True, False])
 def test_a_collision_check_that_is_too_easy_is_found(informed, monkeypatch):
-    monkeypatch.setattr(ClearanceField, "body", lambda field, vehicle: CollisionChecker(field.kernel, vehicle.robot_radius / 2))
+    monkeypatch.setattr(ClearanceField, "collision_checker",
+                        lambda field, vehicle: CollisionChecker(field.kernel, vehicle.robot_radius / 2))
     found = " ".join(findings_of(walled_trial(informed=informed), monkeypatch))
     assert "the tree's edges: along curve " in found and "less than the robot's radius, 0.4 m" in found
 
 
 def test_a_collision_check_that_is_too_strict_is_found(monkeypatch):
-    monkeypatch.setattr(ClearanceField, "body",
+    monkeypatch.setattr(ClearanceField, "collision_checker",
                         lambda field, vehicle: CollisionChecker(field.kernel, vehicle.robot_radius + 0.65))
     found = " ".join(findings_of(walled_trial(start=STRAIGHT_ON), monkeypatch))
     assert "the planner holds DubinsCurve(" in found and "to touch something, but the gap is 0.58" in found  # 0.6 less 2 % of 1

@@ -328,7 +328,8 @@ def test_a_limit_lets_just_the_shorter_curves_pass():
                 if length < 1e-6:
                     continue
                 for limit in (length * (1 + 1e-6), length * (1 - 1e-6)):
-                    _, *arcs = kernel.shortest_within(x1 - x0, y1 - y0, a, math.sin(a), math.cos(a),
-                                                      b, math.sin(b), math.cos(b), radius, 0.0, limit)
+                    curve = kernel.shortest_within(x1 - x0, y1 - y0, a, math.sin(a), math.cos(a),
+                                                   b, math.sin(b), math.cos(b), radius, 0.0, limit)
+                    arcs = curve.first, curve.second, curve.third
                     assert (arcs[0] < 1e300) == (limit > length)
                     assert limit < length or sum(arcs) == pytest.approx(length, rel=1e-9)

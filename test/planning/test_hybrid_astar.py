@@ -38,9 +38,10 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
     """One run."""
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
-    return HybridAStar(field.body(problem.vehicle), radius, problem.start, np.array([problem.goal]),
-                       DistanceField.to_goal(problem, field).kernel, corners.min(axis=0), np.ptp(corners, axis=0),
-                       arc * radius, sectors, weight, visit_penalty, limit, most)
+    return HybridAStar(checker=field.collision_checker(problem.vehicle), radius=radius, start=problem.start,
+                       goals=np.array([problem.goal]), to_goal=DistanceField.to_goal(problem, field).kernel,
+                       corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=sectors,
+                       weight=weight, visit_penalty=visit_penalty, limit=limit, max_expanded=most)
 
 
 def finished(search, radius=VEHICLE.turning_radius, portion=1000):

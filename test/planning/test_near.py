@@ -28,8 +28,9 @@ class Inner:
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.grown = SearchTree(root, radius, low, high - low)
-        self.grower = RrtKernel(self.grown, self.field.body(VEHICLE), step, NEAR_FACTOR, MOST_NEAR,
-                             (1e6, 1e6, 0.0), 0.0, 0.0)
+        self.grower = RrtKernel(tree=self.grown, checker=self.field.collision_checker(VEHICLE), step=step,
+                                near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=(1e6, 1e6, 0.0), tolerance_xy=0.0,
+                                tolerance_yaw=0.0)
 
     def add(self, sample, algorithm="rrt_star"):
         """Give it a sample; whether it became a node."""

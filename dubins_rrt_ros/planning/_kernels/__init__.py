@@ -5,3 +5,6 @@ same files, some hundred times slower.
 """
 
 from .dubins import COMPILED as COMPILED
+
+#: A length beyond all others, as kernels take and give it.
+UNLIMITED = 1e300

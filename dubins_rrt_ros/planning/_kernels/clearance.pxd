@@ -1,3 +1,5 @@
+from dubins_rrt_ros.planning._kernels.dubins cimport Pose
+
 cdef class Clearance:
     cdef readonly float[:, ::1] field
     cdef readonly double resolution
@@ -6,11 +8,9 @@ cdef class Clearance:
     cdef readonly double width, height
     cdef double exact(self, double x, double y) noexcept nogil
     cdef double at_least(self, double x, double y, double enough) noexcept nogil
-    cdef bint free(self, double x, double y, double required_clearance) noexcept nogil
-    cdef double arc_is_free(self, double x, double y, double theta, double radius, int turn, double length, double s,
+    cdef bint point_is_free(self, double x, double y, double required_clearance) noexcept nogil
+    cdef double arc_is_free(self, Pose pose, double radius, int turn, double length, double s,
                             double required_clearance) noexcept nogil
-    cdef bint curve_is_free(self, double x, double y, double theta, double radius, int word,
-                            double first, double second, double third, double required_clearance) noexcept nogil
     cdef bint sweep_is_clear(self, double[:, ::1] corners, int first, int end, double along, double across,
                              double[:, ::1] spans) noexcept nogil
     cdef void span(self, double x0, double y0, double x1, double y1, double[:, ::1] spans) noexcept nogil

@@ -14,12 +14,14 @@ everywhere, and one that keeps `required_clearance + margin` always passes.
 import cython
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, drive_from, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.distance import left_gap, right_gap
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import UNLIMITED, Pose, drive_from
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
-    from .dubins import drive, drive_from, turn_of
+    from .distance import left_gap, right_gap
+    from .dubins import UNLIMITED, Pose, drive_from
 
 
 @cython.cclass
@@ -35,17 +37,11 @@ class Clearance:
         self.width = field.shape[1] * resolution
         self.height = field.shape[0] * resolution
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def exact(self, x: cython.double, y: cython.double) -> cython.double:
+    def exact(self, x, y):
         """The distance from a point in the raster's frame to the edge of the map."""
         return min(min(x, self.width - x), min(y, self.height - y))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def at_least(self, x: cython.double, y: cython.double, enough: cython.double) -> cython.double:
+    def at_least(self, x, y, enough):
         """The clearance at a point of the map's frame, or a lower bound of it that is at least `enough`; 0 outside."""
         dx: cython.double = x - self.x0
         dy: cython.double = y - self.y0
@@ -60,62 +56,28 @@ class Clearance:
             return 0
         return bound if bound >= enough else self.exact(u, v)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def free(self, x: cython.double, y: cython.double, required_clearance: cython.double) -> cython.bint:
-        """Whether the clearance at a point is at least `required_clearance + margin`."""
+    def point_is_free(self, x, y, required_clearance):
+        """Return whether a point has the required clearance and the margin."""
         return self.at_least(x, y, required_clearance + self.margin) >= required_clearance + self.margin
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def arc_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
-                    length: cython.double, s: cython.double, required_clearance: cython.double) -> cython.double:
-        """Walk an arc from `s` on; by how much the next sample lies beyond its end, or -1 where it hits."""
+    def arc_is_free(self, pose, radius, turn, length, s, required_clearance):
+        """Walk an arc from `s` on; return how far the next sample lies beyond its end, or -1 where it hits."""
         if s > length:
             return s - length
-        sin_theta: cython.double = sin(theta)
-        cos_theta: cython.double = cos(theta)
+        sin_theta: cython.double = sin(pose.theta)
+        cos_theta: cython.double = cos(pose.theta)
         worth_exact: cython.double = required_clearance + self.margin + self.resolution
         found: cython.double
-        px: cython.double
-        py: cython.double
-        ptheta: cython.double
+        at: Pose
         while s <= length:
-            px, py, ptheta = drive_from(x, y, theta, sin_theta, cos_theta, radius, turn, s)
-            found = self.at_least(px, py, worth_exact)
+            at = drive_from(pose, sin_theta, cos_theta, radius, turn, s)
+            found = self.at_least(at.x, at.y, worth_exact)
             if found < required_clearance + self.margin:
                 return -1
             s += found - required_clearance + self.margin / 2
         return s - length
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def curve_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double,
-                      required_clearance: cython.double) -> cython.bint:
-        """Whether a curve keeps the clearance `required_clearance`; see the module's guarantee."""
-        rest: cython.double = self.arc_is_free(x, y, theta, radius, turn_of(word, 0), first, 0, required_clearance)
-        if rest < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 0), first)
-        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 1), second, rest, required_clearance)
-        if rest < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 1), second)
-        rest = self.arc_is_free(x, y, theta, radius, turn_of(word, 2), third, rest, required_clearance)
-        if rest < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 2), third)
-        return self.free(x, y, required_clearance)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def sweep_is_clear(self, corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
-                       across: cython.double, spans: cython.double[:, ::1]) -> cython.bint:
+    def sweep_is_clear(self, corners, first, end, along, across, spans):
         """Whether a convex polygon that moves straight touches no obstacle and stays on the map.
 
         Args:
@@ -123,10 +85,10 @@ class Clearance:
             along, across: how far it moves [m].
             spans: (rows, 2) for the raster's rows, to work in.
         """
-        left: cython.double = 1e300
-        right: cython.double = -1e300
-        low: cython.double = 1e300
-        high: cython.double = -1e300
+        left: cython.double = UNLIMITED
+        right: cython.double = -UNLIMITED
+        low: cython.double = UNLIMITED
+        high: cython.double = -UNLIMITED
         i: cython.int
         for i in range(first, end):
             left = min(left, min(corners[i, 0], corners[i, 0] + along))
@@ -138,7 +100,7 @@ class Clearance:
         first_row: cython.int = self.row_of(low)
         last_row: cython.int = self.row_of(high)
         for i in range(first_row, last_row + 1):
-            spans[i, 0], spans[i, 1] = 1e300, -1e300
+            spans[i, 0], spans[i, 1] = UNLIMITED, -UNLIMITED
         before: cython.int = end - 1
         for i in range(first, end):
             self.span(corners[before, 0], corners[before, 1], corners[i, 0], corners[i, 1], spans)
@@ -149,11 +111,7 @@ class Clearance:
             before = i
         return self.spans_are_clear(first_row, last_row, spans, corners, first, end, along, across)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def span(self, x0: cython.double, y0: cython.double, x1: cython.double, y1: cython.double, spans: cython.double[:, ::1]
-             ) -> cython.void:
+    def span(self, x0, y0, x1, y1, spans ):
         """Widen the spans of the rows that an edge leads through by what it covers of them."""
         if y1 < y0:
             x0, y0, x1, y1 = x1, y1, x0, y0
@@ -171,28 +129,15 @@ class Clearance:
             at = after
             row += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def row_of(self, y: cython.double) -> cython.int:
+    def row_of(self, y):
         """The row of the raster that holds a y in its frame."""
         return min(cython.cast(cython.int, y / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def column_of(self, x: cython.double) -> cython.int:
+    def column_of(self, x):
         """The column of the raster that holds an x in its frame."""
         return min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
-                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
-                        across: cython.double) -> cython.bint:
+    def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
         """Whether no obstacle is touched by what `sweep_is_clear` asks for, of which `spans` are the parts in the rows."""
         return True
 
@@ -201,13 +146,7 @@ class Clearance:
         i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(points.shape[0]):
-                out[i] = self.at_least(points[i, 0], points[i, 1], 1e300)
-
-    def is_curve_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double,
-                      required_clearance: cython.double) -> bool:
-        """Whether a curve keeps the clearance `required_clearance`; see the module's guarantee."""
-        return self.curve_is_free(x, y, theta, radius, word, first, second, third, required_clearance)
+                out[i] = self.at_least(points[i, 0], points[i, 1], UNLIMITED)
 
 
 @cython.cclass
@@ -221,25 +160,16 @@ class GridClearance(Clearance):
         Clearance.__init__(self, field, resolution, origin, margin)
         self.row_gap = row_gap
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def squared_across(self, x: cython.double, row: cython.int, column: cython.int) -> cython.double:
-        """The squared distance along x to the nearest occupied square of a row."""
+    def squared_across(self, x, row, column):
+        """Return the squared distance along x to the nearest occupied square of a row."""
         row_gap: cython.int = self.row_gap[row, column]
         if row_gap == 0:
             return 0
-        # The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
-        left: cython.int = (row_gap >> 2) + (row_gap & 1)
-        right: cython.int = (row_gap >> 2) + (row_gap >> 1 & 1)
-        gap: cython.double = min(x - (column - left + 1) * self.resolution, (column + right) * self.resolution - x)
+        gap: cython.double = min(x - (column - left_gap(row_gap) + 1) * self.resolution,
+                                 (column + right_gap(row_gap)) * self.resolution - x)
         return gap * gap
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def exact(self, x: cython.double, y: cython.double) -> cython.double:
+    def exact(self, x, y):
         """The distance to the nearest occupied square or the map's edge: rows outward until they are too far."""
         nearest: cython.double = Clearance.exact(self, x, y)
         nearest = nearest * nearest
@@ -260,12 +190,7 @@ class GridClearance(Clearance):
             down += self.resolution
         return sqrt(nearest)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
-                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
-                        across: cython.double) -> cython.bint:
+    def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
         """Whether no cell in the spans is occupied: from each, go on to where the next occupied one to the right may be."""
         row: cython.int
         column: cython.int
@@ -278,7 +203,7 @@ class GridClearance(Clearance):
                 row_gap = self.row_gap[row, column]
                 if row_gap == 0:
                     return False
-                column += (row_gap >> 2) + (row_gap >> 1 & 1)
+                column += right_gap(row_gap)
         return True
 
 
@@ -296,26 +221,18 @@ class PolygonClearance(Clearance):
         self.first_edge = first_edge
         self.edge_of = edge_of
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def exact(self, x: cython.double, y: cython.double) -> cython.double:
+    def exact(self, x, y):
         """The distance to the nearest edge."""
         row: cython.int = self.row_of(y)
         column: cython.int = self.column_of(x)
         cell: cython.Py_ssize_t = row * self.field.shape[1] + column
-        nearest: cython.double = 1e300
+        nearest: cython.double = UNLIMITED
         i: cython.Py_ssize_t
         for i in range(self.first_edge[cell], self.first_edge[cell + 1]):
             nearest = min(nearest, squared_to_segment(x, y, self.edges, self.edge_of[i]))
         return sqrt(nearest)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def spans_are_clear(self, first_row: cython.int, last_row: cython.int, spans: cython.double[:, ::1],
-                        corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
-                        across: cython.double) -> cython.bint:
+    def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
         """Whether no edge is touched: where one is, it is the nearest one to a point of a cell in the spans, at no distance."""
         row: cython.int
         column: cython.int
@@ -360,7 +277,7 @@ def lies_beyond(normal_x: cython.double, normal_y: cython.double, corners: cytho
                 end: cython.int, along: cython.double, across: cython.double, edges: cython.double[:, ::1], edge: cython.int
                 ) -> cython.bint:
     """Whether an edge is farther in a direction than all of a convex polygon that moves straight."""
-    farthest: cython.double = -1e300
+    farthest: cython.double = -UNLIMITED
     i: cython.int
     for i in range(first, end):
         farthest = max(farthest, normal_x * corners[i, 0] + normal_y * corners[i, 1])

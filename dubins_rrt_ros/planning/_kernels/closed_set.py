@@ -62,10 +62,7 @@ class ClosedSet:
         for i in range(cells.shape[0]):
             self.costs[self.entry_of(cells[i])] = costs[i]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def entry_at(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.int:
+    def entry_at(self, x, y, theta):
         """The entry of the cell that holds a pose of the map; if it has none yet, there must be room for it."""
         column: cython.longlong = min(cython.cast(cython.longlong, max(x - self.x0, 0.0) / self.side), self.columns - 1)
         row: cython.longlong = min(cython.cast(cython.longlong, max(y - self.y0, 0.0) / self.side), self.rows - 1)
@@ -75,10 +72,7 @@ class ClosedSet:
         place: cython.ulonglong = row * columns + column
         return self.entry_of(cython.cast(cython.longlong, (place * self.sectors + sector) & TOLD_APART))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def entry_of(self, cell: cython.longlong) -> cython.int:
+    def entry_of(self, cell):
         """The entry of a cell by its number."""
         number: cython.ulonglong = cython.cast(cython.ulonglong, cell)
         entry: cython.int = cython.cast(cython.int, (number * GOLDEN_RATIO_64 & BITS_OF_WORD) >> (64 - self.bits))

@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The vehicle's body on a map: whether it touches an obstacle at a pose, or anywhere along a curve.
+"""Collision checkers: whether the vehicle touches an obstacle at a pose, or anywhere along a curve.
 
 A disc is a matter of the clearance alone. For a polygon the gap between it and the obstacles decides, which is at least that of
 the discs that cover it; where these are too coarse, the polygon made wider by some distance is held against the obstacles, which
@@ -18,65 +18,81 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import drive, drive_from, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
+        UNLIMITED,
+        Curve,
+        Pose,
+        arc_length,
+        drive,
+        drive_from,
+        turn_of,
+    )
     from cython.cimports.libc.math import cos, hypot, sin
 else:
     from math import cos, hypot, sin
 
     from .clearance import Clearance
-    from .dubins import drive, drive_from, turn_of
+    from .dubins import UNLIMITED, Curve, Pose, arc_length, drive, drive_from, turn_of
 
-#: The gap of a body that touches an obstacle.
-CONTACT = cython.declare(cython.double, -1e300)
-#: By this factor a polygon is made less wide until it is clear.
+#: Gap of a vehicle that touches an obstacle.
+CONTACT = cython.declare(cython.double, -UNLIMITED)
+#: Factor by which a widened polygon is narrowed until it is clear.
 NARROWER = cython.declare(cython.double, 0.25)
 
 
 @cython.cclass
 class CollisionChecker:
-    """A disc around the reference point.
+    """The checker of a disc around the reference point.
 
     Attributes:
-        required_clearance: its radius; for other bodies, that of the largest disc around the reference point that they cover [m].
+        required_clearance: the disc's radius; for other shapes, that of the largest disc around the reference point inside [m].
     """
 
     def __init__(self, clearance: Clearance, required_clearance: cython.double):
         self.clearance, self.required_clearance = clearance, required_clearance
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def free(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.bint:
-        """Whether the body keeps the margin at a pose."""
-        return self.clearance.free(x, y, self.required_clearance)
+    def pose_is_free(self, pose):
+        """Return whether the vehicle keeps the margin at a pose."""
+        return self.clearance.point_is_free(pose.x, pose.y, self.required_clearance)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def curve_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double) -> cython.bint:
-        """Whether the body is free all along a curve; see the module's guarantee."""
-        return self.clearance.curve_is_free(x, y, theta, radius, word, first, second, third, self.required_clearance)
+    def motion_is_free(self, pose, radius, curve):
+        """Return whether the vehicle is free all along a curve; see the module's guarantee."""
+        turn: cython.int
+        arc: cython.int
+        length: cython.double
+        walked: cython.double = 0
+        for arc in range(3):
+            turn, length = turn_of(curve.word, arc), arc_length(curve, arc)
+            walked = self.arc_is_free(pose, radius, turn, length, walked)
+            if walked < 0:
+                return False
+            pose = drive(pose, radius, turn, length)
+        return self.pose_is_free(pose)
 
-    def is_free(self, x: cython.double, y: cython.double, theta: cython.double) -> bool:
-        """Whether the body keeps the margin at a pose."""
-        return self.free(x, y, theta)
+    def arc_is_free(self, pose, radius, turn, length, walked):
+        """Walk an arc, the first `walked` of which is known to be free; return how far the next sample lies beyond its end, or -1
+        where the vehicle hits."""
+        return self.clearance.arc_is_free(pose, radius, turn, length, walked, self.required_clearance)
 
-    def is_curve_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double) -> bool:
-        """Whether the body is free all along a curve; see the module's guarantee."""
-        return self.curve_is_free(x, y, theta, radius, word, first, second, third)
+    def is_pose_free(self, pose) -> bool:
+        """Return whether the vehicle keeps the margin at a pose (x, y, theta)."""
+        return self.pose_is_free(Pose(pose[0], pose[1], pose[2]))
+
+    def is_motion_free(self, pose, radius: cython.double, word: cython.int, lengths) -> bool:
+        """Return whether the vehicle is free all along the curve of three lengths [m] from (x, y, theta)."""
+        return self.motion_is_free(Pose(pose[0], pose[1], pose[2]), radius, Curve(word, lengths[0], lengths[1], lengths[2]))
 
 
 @cython.cclass
 class PolygonChecker(CollisionChecker):
-    """A polygon, as `footprint.py` prepares it. It has room of its own to work in: no two threads may share one."""
+    """The checker of a polygon, as `collision/footprint.py` prepares it. It works in arrays of its own: no two threads may share
+    one."""
 
     def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, worth):
         """
         Args:
-            required_clearance: the radius of the largest disc around the reference point that the polygon covers [m].
-            discs: (m, 4): the discs that cover it: x, y, radius, and the radius of a disc there that it covers [m].
+            required_clearance: radius of the largest disc around the reference point inside the polygon [m].
+            discs: (m, 4): the discs that cover it: x, y, radius, and the radius of a disc there inside it [m].
             corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and how far they move, per metre that the
                 part is made wider by.
             first_corner: (p + 1,) int32: where each part's corners begin.
@@ -87,148 +103,97 @@ class PolygonChecker(CollisionChecker):
         self.placed = np.empty((len(corners), 2))
         self.spans = np.empty((clearance.field.shape[0], 2))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def free(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.bint:
-        """Whether the body keeps the margin at a pose."""
-        found: cython.double = self.rough_gap(x, y, theta)
+    def pose_is_free(self, pose):
+        """Return whether the vehicle keeps the margin at a pose."""
+        found: cython.double = self.rough_gap(pose)
         if found == CONTACT or found >= self.clearance.margin:
             return found != CONTACT
-        return self.is_clear(x, y, theta, self.clearance.margin, 0)
+        return self.is_clear(pose, self.clearance.margin, 0)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def curve_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                      first: cython.double, second: cython.double, third: cython.double) -> cython.bint:
-        """Whether the body is free all along a curve; see the module's guarantee."""
-        moved: cython.double = self.arc_is_free(x, y, theta, radius, turn_of(word, 0), first, 0)
-        if moved < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 0), first)
-        moved = self.arc_is_free(x, y, theta, radius, turn_of(word, 1), second, moved)
-        if moved < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 1), second)
-        if self.arc_is_free(x, y, theta, radius, turn_of(word, 2), third, moved) < 0:
-            return False
-        x, y, theta = drive(x, y, theta, radius, turn_of(word, 2), third)
-        return self.free(x, y, theta)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def arc_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
-                    length: cython.double, moved: cython.double) -> cython.double:
-        """Walk an arc, up to `moved` of which is known to be free, as far as the body's points move; by how much they may still
-        move beyond its end until the next pose is due, or -1 where the body hits."""
+    def arc_is_free(self, pose, radius, turn, length, walked):
+        """`walked` and what is returned are how far the fastest point of the vehicle moves."""
         if turn == 0:
-            return self.straight_is_free(x, y, theta, length, moved)
-        return self.turn_is_free(x, y, theta, radius, turn, length, moved)
+            return self.straight_is_free(pose, length, walked)
+        return self.turn_is_free(pose, radius, turn, length, walked)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def straight_is_free(self, x: cython.double, y: cython.double, theta: cython.double, length: cython.double,
-                         moved: cython.double) -> cython.double:
+    def straight_is_free(self, pose, length, walked):
         """`arc_is_free` straight on: where the discs do not decide, the rest is looked at as a whole."""
         found: cython.double
-        px: cython.double
-        py: cython.double
-        _: cython.double
-        while moved <= length:
-            px, py, _ = drive(x, y, theta, 1, 0, moved)
-            found = self.rough_gap(px, py, theta)
+        at: Pose
+        while walked <= length:
+            at = drive(pose, 1, 0, walked)
+            found = self.rough_gap(at)
             if found == CONTACT:
                 return -1
             if found < self.worth:
-                return 0 if self.is_clear(px, py, theta, self.clearance.margin, length - moved) else -1
-            moved += found + self.clearance.margin / 2
-        return moved - length
+                return 0 if self.is_clear(at, self.clearance.margin, length - walked) else -1
+            walked += found + self.clearance.margin / 2
+        return walked - length
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def turn_is_free(self, x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
-                     length: cython.double, moved: cython.double) -> cython.double:
+    def turn_is_free(self, pose, radius, turn, length, walked):
         """`arc_is_free` in a turn."""
         speed: cython.double = self.speed(radius, turn)
-        sin_theta: cython.double = sin(theta)
-        cos_theta: cython.double = cos(theta)
-        s: cython.double = moved / speed
+        sin_theta: cython.double = sin(pose.theta)
+        cos_theta: cython.double = cos(pose.theta)
+        s: cython.double = walked / speed
         found: cython.double = self.worth
-        px: cython.double
-        py: cython.double
-        ptheta: cython.double
         while s <= length:
-            px, py, ptheta = drive_from(x, y, theta, sin_theta, cos_theta, radius, turn, s)
-            found = self.gap(px, py, ptheta, found)
+            found = self.gap(drive_from(pose, sin_theta, cos_theta, radius, turn, s), found)
             if found == CONTACT:
                 return -1
             s += (found + self.clearance.margin / 2) / speed
         return (s - length) * speed
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def speed(self, radius: cython.double, turn: cython.int) -> cython.double:
-        """How fast the fastest point of the body moves in a turn, in metres per metre along it."""
+    def speed(self, radius, turn):
+        """Return how fast the fastest point of the vehicle moves in a turn, in metres per metre along it."""
         fastest: cython.double = 1
         i: cython.Py_ssize_t
         for i in range(self.corners.shape[0]):
             fastest = max(fastest, hypot(1 - turn * self.corners[i, 1] / radius, self.corners[i, 0] / radius))
         return fastest
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def gap(self, x: cython.double, y: cython.double, theta: cython.double, expected: cython.double) -> cython.double:
-        """A lower bound of the gap between the body and the obstacles, at least `margin`; or CONTACT. What is `expected` saves
-        work where it comes close."""
-        found: cython.double = self.rough_gap(x, y, theta)
+    def gap(self, pose, expected):
+        """Return a lower bound of the gap between vehicle and obstacles, at least `margin`; or CONTACT.
+
+        A good guess of what is `expected` saves work.
+        """
+        found: cython.double = self.rough_gap(pose)
         if found == CONTACT or found >= self.worth:
             return found
         wider: cython.double = min(2 * expected, self.worth)
         while wider > self.clearance.margin:
-            if self.is_clear(x, y, theta, wider, 0):
+            if self.is_clear(pose, wider, 0):
                 return wider
             wider *= NARROWER
-        return self.clearance.margin if self.is_clear(x, y, theta, self.clearance.margin, 0) else CONTACT
+        return self.clearance.margin if self.is_clear(pose, self.clearance.margin, 0) else CONTACT
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def rough_gap(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.double:
-        """A lower bound of the gap, by the discs: negative where these touch obstacles; CONTACT where the body does for sure."""
-        cos_theta: cython.double = cos(theta)
-        sin_theta: cython.double = sin(theta)
-        least: cython.double = 1e300
+    def rough_gap(self, pose):
+        """Return a lower bound of the gap, by the discs: negative where these touch obstacles; CONTACT where the vehicle does for
+        sure."""
+        cos_theta: cython.double = cos(pose.theta)
+        sin_theta: cython.double = sin(pose.theta)
+        least: cython.double = UNLIMITED
         found: cython.double
         i: cython.Py_ssize_t
         for i in range(self.discs.shape[0]):
-            found = self.clearance.at_least(x + cos_theta * self.discs[i, 0] - sin_theta * self.discs[i, 1],
-                                            y + sin_theta * self.discs[i, 0] + cos_theta * self.discs[i, 1],
+            found = self.clearance.at_least(pose.x + cos_theta * self.discs[i, 0] - sin_theta * self.discs[i, 1],
+                                            pose.y + sin_theta * self.discs[i, 0] + cos_theta * self.discs[i, 1],
                                             self.discs[i, 2] + self.worth)
             if found < self.discs[i, 3]:
                 return CONTACT
             least = min(least, found - self.discs[i, 2])
         return least
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def is_clear(self, x: cython.double, y: cython.double, theta: cython.double, wider: cython.double,
-                 ahead: cython.double) -> cython.bint:
-        """Whether the body, made wider and driven straight ahead from a pose, touches no obstacle."""
+    def is_clear(self, pose, wider, ahead):
+        """Return whether the vehicle, made wider and driven straight ahead from a pose, touches no obstacle."""
         cos_yaw: cython.double = self.clearance.cos_yaw
         sin_yaw: cython.double = self.clearance.sin_yaw
-        x -= self.clearance.x0
-        y -= self.clearance.y0
+        x: cython.double = pose.x - self.clearance.x0
+        y: cython.double = pose.y - self.clearance.y0
         column: cython.double = cos_yaw * x + sin_yaw * y
         row: cython.double = cos_yaw * y - sin_yaw * x
-        cos_theta: cython.double = cos(theta) * cos_yaw + sin(theta) * sin_yaw
-        sin_theta: cython.double = sin(theta) * cos_yaw - cos(theta) * sin_yaw
+        cos_theta: cython.double = cos(pose.theta) * cos_yaw + sin(pose.theta) * sin_yaw
+        sin_theta: cython.double = sin(pose.theta) * cos_yaw - cos(pose.theta) * sin_yaw
         along: cython.double
         across: cython.double
         i: cython.int

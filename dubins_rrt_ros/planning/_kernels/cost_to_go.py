@@ -143,10 +143,7 @@ class CostToGoKernel:
             for i in range(points.shape[0]):
                 out[i] = self.heading(points[i, 0], points[i, 1])
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def at(self, x: cython.double, y: cython.double) -> cython.double:
+    def at(self, x, y):
         """The cost at a point of the map's frame, not below 0; 1e300 where no way is."""
         column: cython.double
         row: cython.double
@@ -154,10 +151,7 @@ class CostToGoKernel:
         cost: cython.double = self.squares_to(column, row)
         return max(0.0, (cost - self.deduction) * self.side * (1 - ROUNDING) - ROUNDING) if cost < FAR else FAR
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def squares_to(self, column: cython.double, row: cython.double) -> cython.double:
+    def squares_to(self, column, row):
         """The cost at a column and row in sides of a square, with what is to be deducted; 1e300 where no way is."""
         square: cython.int = self.square_at(column, row)
         if square < 0 or not self.free[square]:
@@ -167,10 +161,7 @@ class CostToGoKernel:
             return FAR
         return self.within(square, column - square % self.width, row - square // self.width)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def heading(self, x: cython.double, y: cython.double) -> cython.double:
+    def heading(self, x, y):
         """The heading in which the cost falls at a point, averaged over the nodes around it; NaN where it falls at none."""
         column: cython.double
         row: cython.double
@@ -195,20 +186,14 @@ class CostToGoKernel:
         return atan2(self.clearance.sin_yaw * along + self.clearance.cos_yaw * across,
                      self.clearance.cos_yaw * along - self.clearance.sin_yaw * across)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def place(self, x: cython.double, y: cython.double) -> tuple[cython.double, cython.double]:
+    def place(self, x, y):
         """Column and row of a point of the map's frame, whole numbers at the nodes."""
         dx: cython.double = x - self.clearance.x0
         dy: cython.double = y - self.clearance.y0
         return (1 + (self.clearance.cos_yaw * dx + self.clearance.sin_yaw * dy) / self.side,
                 1 + (self.clearance.cos_yaw * dy - self.clearance.sin_yaw * dx) / self.side)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def square_at(self, column: cython.double, row: cython.double) -> cython.int:
+    def square_at(self, column, row):
         """The square that holds a place, or -1 beyond the squares."""
         columns: cython.int = self.width - 3
         rows: cython.int = self.size // self.width - 3
@@ -216,10 +201,7 @@ class CostToGoKernel:
             return -1
         return min(cython.cast(cython.int, row), rows) * self.width + min(cython.cast(cython.int, column), columns)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def within(self, square: cython.int, along: cython.double, across: cython.double) -> cython.double:
+    def within(self, square, along, across):
         """The cost at a place of a square, as the nodes have it, by its share of the side along the row and across."""
         here: cython.double = self.cost[square]
         right: cython.double = self.cost[square + 1]
@@ -236,10 +218,7 @@ class CostToGoKernel:
             return here + along * (right - here) + across * (above - here)
         return beyond + (1 - along) * (above - beyond) + (1 - across) * (right - beyond)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def fall(self, node: cython.int, step: cython.int, beside: cython.int) -> cython.double:
+    def fall(self, node, step, beside):
         """By how much the cost falls along an edge from a node to the cheaper neighbour by a step; negative to that before."""
         ahead: cython.double = FAR
         behind: cython.double = FAR

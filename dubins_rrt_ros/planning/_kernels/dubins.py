@@ -24,6 +24,10 @@ if cython.compiled:
 else:
     from math import asin, atan2, cos, fabs, fmod, remainder, sin, sqrt
 
+    # As dubins.pxd declares them. Values: a pose or a curve is never changed once it is made, since C copies and Python does not.
+    Pose = cython.struct(x=cython.double, y=cython.double, theta=cython.double)
+    Curve = cython.struct(word=cython.int, first=cython.double, second=cython.double, third=cython.double)
+
 COMPILED: bool = cython.compiled
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
@@ -40,7 +44,8 @@ FIT = cython.declare(cython.double, 2e-13)
 COORDINATE_ERROR = cython.declare(cython.double, 1e-15)
 #: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
 COSINE_ERROR = cython.declare(cython.double, 1e-14)
-NO_CURVE = cython.declare(cython.double, 1e300)
+#: A length beyond all others: no limit, or of a curve that does not exist.
+UNLIMITED = cython.declare(cython.double, 1e300)
 #: No curve is longer, in turning radii; its square is finite.
 LONGEST = cython.declare(cython.double, 1e150)
 
@@ -58,10 +63,7 @@ def mod_two_pi(angle: cython.double) -> cython.double:
     return angle - TWO_PI if angle >= TWO_PI else angle + 0.0  # no -0.0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def turn_of(word: cython.int, arc: cython.int) -> cython.int:
+def turn_of(word, arc):
     """+1 where the arc of the word turns left, -1 right, 0 straight on."""
     first: cython.int = 1 if word == 0 or word == 2 or word == 5 else -1
     if arc == 0:
@@ -71,44 +73,70 @@ def turn_of(word: cython.int, arc: cython.int) -> cython.int:
     return -first if word == 2 or word == 3 else first
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def drive(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, turn: cython.int,
-          s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
-    """The operators L_v, R_v and S_v of the paper: the pose after an arc of length `s`."""
+def length_of(curve):
+    """Return the length of a curve."""
+    return curve.first + curve.second + curve.third
+
+
+def arc_length(curve, arc):
+    """Return the length of arc 0, 1 or 2 of a curve."""
+    return curve.first if arc == 0 else curve.second if arc == 1 else curve.third
+
+
+def single_arc(turn, length):
+    """Return the curve of one arc: +1 left, -1 right, 0 straight on."""
+    return Curve(1 if turn < 0 else 0, length if turn != 0 else 0, length if turn == 0 else 0, 0)
+
+
+def first_part(curve, length):
+    """Return the first `length` of a curve."""
+    first: cython.double = min(curve.first, length)
+    second: cython.double = min(curve.second, length - first)
+    return Curve(curve.word, first, second, min(curve.third, length - first - second))
+
+
+def part_of(curve, begin, end):
+    """Return the part of a curve from `begin` to `end` along it."""
+    second: cython.double = curve.first + curve.second
+    return Curve(curve.word, max(0.0, min(end, curve.first) - max(begin, 0.0)),
+                 max(0.0, min(end, second) - max(begin, curve.first)),
+                 max(0.0, min(end, second + curve.third) - max(begin, second)))
+
+
+def drive(pose, radius, turn, s):
+    """Return the pose after an arc of length `s`: the operators L_v, R_v and S_v of the paper."""
     if s == 0:
-        return x, y, theta
-    return drive_from(x, y, theta, sin(theta), cos(theta), radius, turn, s)
+        return pose
+    return drive_from(pose, sin(pose.theta), cos(pose.theta), radius, turn, s)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def drive_from(x: cython.double, y: cython.double, theta: cython.double, sin_theta: cython.double, cos_theta: cython.double,
-               radius: cython.double, turn: cython.int, s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
+def drive_from(pose, sin_theta, cos_theta, radius, turn, s):
     """`drive` from a pose whose sine and cosine are known."""
     if turn == 0:
-        return x + s * cos_theta, y + s * sin_theta, theta
-    after: cython.double = theta + turn * s / radius
-    return (x + turn * radius * (sin(after) - sin_theta), y - turn * radius * (cos(after) - cos_theta), after)
+        return Pose(pose.x + s * cos_theta, pose.y + s * sin_theta, pose.theta)
+    after: cython.double = pose.theta + turn * s / radius
+    return Pose(pose.x + turn * radius * (sin(after) - sin_theta), pose.y - turn * radius * (cos(after) - cos_theta), after)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def along(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-          first: cython.double, second: cython.double, third: cython.double,
-          s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
-    """The pose after `s` along a curve; all lengths in metres."""
-    if s <= first:
-        return drive(x, y, theta, radius, turn_of(word, 0), s)
-    x, y, theta = drive(x, y, theta, radius, turn_of(word, 0), first)
-    s -= first
-    if s <= second:
-        return drive(x, y, theta, radius, turn_of(word, 1), s)
-    x, y, theta = drive(x, y, theta, radius, turn_of(word, 1), second)
-    return drive(x, y, theta, radius, turn_of(word, 2), min(s - second, third))
+def end_of(pose, radius, curve):
+    """Return the pose at the end of a curve."""
+    arc: cython.int
+    for arc in range(3):
+        pose = drive(pose, radius, turn_of(curve.word, arc), arc_length(curve, arc))
+    return pose
+
+
+def along(pose, radius, curve, s):
+    """Return the pose after `s` along a curve; all lengths in metres."""
+    arc: cython.int
+    length: cython.double
+    for arc in range(2):
+        length = arc_length(curve, arc)
+        if s <= length:
+            return drive(pose, radius, turn_of(curve.word, arc), s)
+        pose = drive(pose, radius, turn_of(curve.word, arc), length)
+        s -= length
+    return drive(pose, radius, turn_of(curve.word, 2), min(s, curve.third))
 
 
 @cython.cfunc
@@ -117,13 +145,10 @@ def along(x: cython.double, y: cython.double, theta: cython.double, radius: cyth
 def fits(word: cython.int, t: cython.double, p: cython.double, q: cython.double, x: cython.double, y: cython.double,
          theta0: cython.double, theta1: cython.double, rounding: cython.double) -> cython.bint:
     """Whether a curve that is driven from (0, 0, theta0) ends at (x, y, theta1), where x and y are rounded by so much."""
-    end_x: cython.double
-    end_y: cython.double
-    end_theta: cython.double
-    end_x, end_y, end_theta = along(0, 0, theta0, 1, word, t, p, q, t + p + q)
+    end: Pose = along(Pose(0, 0, theta0), 1, Curve(word, t, p, q), t + p + q)
     tolerance: cython.double = FIT * (1 + fabs(x) + fabs(y))
-    return (fabs(end_x - x) <= tolerance + rounding and fabs(end_y - y) <= tolerance + rounding
-            and fabs(remainder(end_theta - theta1, TWO_PI)) <= tolerance)
+    return (fabs(end.x - x) <= tolerance + rounding and fabs(end.y - y) <= tolerance + rounding
+            and fabs(remainder(end.theta - theta1, TWO_PI)) <= tolerance)
 
 
 @cython.cfunc
@@ -179,7 +204,7 @@ def straight_turns_at_least(first: cython.int, last: cython.int, cos_straight: c
 def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
          theta1: cython.double, sin1: cython.double, cos1: cython.double, left: cython.double,
          rounding: cython.double, limit: cython.double) -> tuple[cython.double, cython.double, cython.double]:
-    """(t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1), or p = NO_CURVE: none, or none shorter than `limit`.
+    """(t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1), or p = UNLIMITED: none, or none shorter than `limit`.
 
     x and y are rounded by no more than `rounding`. `left` is theta1 - theta0 in [0, 2 pi). It, (u, v), and the direction of the
     straight arc tell most words to be too long before an arctangent is taken.
@@ -196,13 +221,13 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
     q: cython.double
     if word >= 4:
         if squared > 16 + ROUNDING:
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         p = min(sqrt(squared) / 4, 1.0)
         if TWO_PI - PI * p >= limit:  # asin(p) <= p pi / 2
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         p = TWO_PI - 2 * asin(p)
         if p + mod_two_pi(turned + p) >= limit:
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         t = mod_two_pi(s * (atan2(v, u) - theta0) + p / 2)
         q = mod_two_pi(turned - t + p)
     elif s == last:
@@ -210,20 +235,20 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
         if squared <= least * least and turned < limit and fits(word, turned, 0, 0, x, y, theta0, theta1, rounding):
             return turned, 0, 0  # both poses on one circle, where the direction of (u, v) is but rounding
         if turned >= limit or squared >= (limit - turned) * (limit - turned):
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         p = sqrt(squared)
         if p > 0 and p + straight_turns_at_least(s, last, u / p, v / p, sin0, cos0, sin1, cos1) >= limit:
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         t = mod_two_pi(s * (atan2(v, u) - theta0))
         q = mod_two_pi(turned - t)
     else:
         least = min(turned, TWO_PI - turned)
         if squared < 4 - ROUNDING or least >= limit or squared - 4 >= (limit - least) * (limit - least):
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         p = sqrt(max(squared - 4, 0.0))
         if p + straight_turns_at_least(s, last, (p * u - 2 * s * v) / squared, (p * v + 2 * s * u) / squared,
                                        sin0, cos0, sin1, cos1) >= limit:
-            return 0, NO_CURVE, 0
+            return 0, UNLIMITED, 0
         t = mod_two_pi(s * (atan2(v, u) - theta0) + atan2(2.0, p))
         q = mod_two_pi(t - turned)
     if t > TWO_PI - NEARLY_NONE or q > TWO_PI - NEARLY_NONE:
@@ -231,32 +256,23 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
     return t, p, q
 
 
-@cython.ccall
-@cython.nogil
-@cython.exceptval(check=False)
-def rounding_at(x: cython.double, y: cython.double) -> cython.double:
-    """By how much the rounding of poses around (x, y) may move what lies between them [m]."""
+def rounding_at(x, y):
+    """Return by how much the rounding of poses around (x, y) may move what lies between them [m]."""
     return COORDINATE_ERROR * max(fabs(x), fabs(y))
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
-                    theta1: cython.double, sin1: cython.double, cos1: cython.double, radius: cython.double,
-                    rounding: cython.double, limit: cython.double
-                    ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
-    """(word, first, second, third) in metres: the shortest curve to a goal that lies (dx, dy) from the start.
+def shortest_within(dx, dy, theta0, sin0, cos0, theta1, sin1, cos1, radius, rounding, limit):
+    """Return the shortest curve to a goal that lies (dx, dy) from the start; lengths in metres.
 
-    dx and dy, in metres too, are rounded by no more than `rounding`. `first` is NO_CURVE where that curve is not shorter than
-    `limit`, which is found out in a fraction of the time.
+    dx and dy, in metres too, are rounded by no more than `rounding`. The first arc is UNLIMITED where that curve is not shorter
+    than `limit`, which is found out in a fraction of the time.
     """
     x: cython.double = dx / radius
     y: cython.double = dy / radius
     left: cython.double = mod_two_pi(theta1 - theta0)
     best: cython.double = min(limit / radius, LONGEST)
     best_word: cython.int = 0
-    best_t: cython.double = NO_CURVE
+    best_t: cython.double = UNLIMITED
     best_p: cython.double = 0
     best_q: cython.double = 0
     t: cython.double
@@ -264,33 +280,33 @@ def shortest_within(dx: cython.double, dy: cython.double, theta0: cython.double,
     q: cython.double
     word: cython.int
     if x == 0 and y == 0 and remainder(theta1 - theta0, TWO_PI) == 0:
-        return 0, 0, 0, 0
+        return Curve(0, 0, 0, 0)
     for word in range(6):
         if word == 4 and best <= PI:
             break
         t, p, q = arcs(word, x, y, theta0, sin0, cos0, theta1, sin1, cos1, left, rounding / radius, best)
         if t + p + q < best:
             best, best_word, best_t, best_p, best_q = t + p + q, word, t, p, q
-    if best_t == NO_CURVE:
-        return 0, NO_CURVE, 0, 0
-    return best_word, best_t * radius, best_p * radius, best_q * radius
+    if best_t == UNLIMITED:
+        return Curve(0, UNLIMITED, 0, 0)
+    return Curve(best_word, best_t * radius, best_p * radius, best_q * radius)
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def shortest(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cython.double, y1: cython.double,
-             theta1: cython.double, radius: cython.double
-             ) -> tuple[cython.int, cython.double, cython.double, cython.double]:
-    """(word, first, second, third): the shortest curve; lengths in metres."""
-    return shortest_within(x1 - x0, y1 - y0, theta0, sin(theta0), cos(theta0), theta1, sin(theta1), cos(theta1),
-                           radius, max(rounding_at(x0, y0), rounding_at(x1, y1)), NO_CURVE)
+def shortest(start, goal, radius):
+    """Return the shortest curve between two poses."""
+    return shortest_below(start, goal, radius, max(rounding_at(start.x, start.y), rounding_at(goal.x, goal.y)), UNLIMITED)
 
 
-def shortest_curve(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cython.double, y1: cython.double,
-                   theta1: cython.double, radius: cython.double):
-    """(word, first, second, third) of the shortest curve; lengths in metres."""
-    return shortest(x0, y0, theta0, x1, y1, theta1, radius)
+def shortest_below(start, goal, radius, rounding, limit):
+    """Return the shortest curve between two poses, or one whose first arc is UNLIMITED where it is not below the limit."""
+    return shortest_within(goal.x - start.x, goal.y - start.y, start.theta, sin(start.theta), cos(start.theta),
+                           goal.theta, sin(goal.theta), cos(goal.theta), radius, rounding, limit)
+
+
+def shortest_curve(start, goal, radius: cython.double):
+    """Return (word, first, second, third) of the shortest curve between (x, y, theta) and another; lengths in metres."""
+    curve: Curve = shortest(Pose(start[0], start[1], start[2]), Pose(goal[0], goal[1], goal[2]), radius)
+    return curve.word, curve.first, curve.second, curve.third
 
 
 def all_curves(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cython.double, y1: cython.double,
@@ -304,8 +320,8 @@ def all_curves(x0: cython.double, y0: cython.double, theta0: cython.double, x1: 
     for word in range(6):
         t, p, q = arcs(word, (x1 - x0) / radius, (y1 - y0) / radius, theta0, sin(theta0), cos(theta0),
                        theta1, sin(theta1), cos(theta1), mod_two_pi(theta1 - theta0),
-                       max(rounding_at(x0, y0), rounding_at(x1, y1)) / radius, NO_CURVE)
-        if p < NO_CURVE:
+                       max(rounding_at(x0, y0), rounding_at(x1, y1)) / radius, UNLIMITED)
+        if p < UNLIMITED:
             found.append((word, t * radius, p * radius, q * radius))
     return found
 
@@ -314,62 +330,43 @@ def shortest_lengths(starts: cython.double[:, ::1], goals: cython.double[:, ::1]
                      out: cython.double[::1]):
     """Write the lengths of the shortest curves between (n, 3) poses to `out`, in metres."""
     i: cython.Py_ssize_t
-    word: cython.int
-    first: cython.double
-    second: cython.double
-    third: cython.double
     with cython.nogil:
         for i in range(starts.shape[0]):
-            word, first, second, third = shortest(starts[i, 0], starts[i, 1], starts[i, 2],
-                                                  goals[i, 0], goals[i, 1], goals[i, 2], radius)
-            out[i] = first + second + third
+            out[i] = length_of(shortest(Pose(starts[i, 0], starts[i, 1], starts[i, 2]),
+                                        Pose(goals[i, 0], goals[i, 1], goals[i, 2]), radius))
 
 
-def pose_along(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-               first: cython.double, second: cython.double, third: cython.double, s: cython.double):
-    """The pose after `s` along a curve; all lengths in metres."""
-    return along(x, y, theta, radius, word, first, second, third, s)
+def pose_along(start, radius: cython.double, word: cython.int, lengths, s: cython.double):
+    """Return the pose (x, y, theta) after `s` along a curve of three lengths; all lengths in metres."""
+    pose: Pose = along(Pose(start[0], start[1], start[2]), radius, Curve(word, lengths[0], lengths[1], lengths[2]), s)
+    return pose.x, pose.y, pose.theta
 
 
-def poses_along(x: cython.double, y: cython.double, theta: cython.double, radius: cython.double, word: cython.int,
-                first: cython.double, second: cython.double, third: cython.double, arc_lengths: cython.double[::1],
+def poses_along(start, radius: cython.double, word: cython.int, lengths, arc_lengths: cython.double[::1],
                 out: cython.double[:, ::1]):
-    """Write the poses at the arc lengths `arc_lengths` to `out` (n, 3), headings in [-pi, pi] but for the first."""
+    """Write the poses at (n,) arc lengths of a curve to `out` (n, 3), headings in [-pi, pi] but for the first."""
+    begin: Pose = Pose(start[0], start[1], start[2])
+    curve: Curve = Curve(word, lengths[0], lengths[1], lengths[2])
+    pose: Pose
     i: cython.Py_ssize_t
     for i in range(arc_lengths.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = along(x, y, theta, radius, word, first, second, third, arc_lengths[i])
-        if i > 0:
-            out[i, 2] = remainder(out[i, 2], TWO_PI)
+        pose = along(begin, radius, curve, arc_lengths[i])
+        out[i, 0], out[i, 1], out[i, 2] = pose.x, pose.y, pose.theta if i == 0 else remainder(pose.theta, TWO_PI)
 
 
-def chain_poses(poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], radius: cython.double,
-                curves: cython.long[::1], arc_lengths: cython.double[::1], out: cython.double[:, ::1]):
-    """Write the poses at the arc lengths `arc_lengths` of a chain's `curves` to `out` (m, 3), headings in [-pi, pi].
+def path_poses(poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1], radius: cython.double,
+               starts: cython.long[::1], ends: cython.long[::1], arc_lengths: cython.double[::1], out: cython.double[:, ::1]):
+    """Write the poses at the arc lengths of curves to `out` (m, 3), headings in [-pi, pi].
 
-    Curve i leads from pose i to pose i + 1, whose word and lengths are its own.
+    Curve i leads from pose `starts[i]` to pose `ends[i]`, whose word and lengths are its own.
     """
     i: cython.Py_ssize_t
-    pose: cython.Py_ssize_t
+    start: cython.Py_ssize_t
+    end: cython.Py_ssize_t
+    pose: Pose
     with cython.nogil:
-        for i in range(curves.shape[0]):
-            pose = curves[i]
-            out[i, 0], out[i, 1], out[i, 2] = along(poses[pose, 0], poses[pose, 1], poses[pose, 2], radius, words[pose + 1],
-                                                    lengths[pose + 1, 0], lengths[pose + 1, 1], lengths[pose + 1, 2],
-                                                    arc_lengths[i])
-            out[i, 2] = remainder(out[i, 2], TWO_PI)
-
-
-def edge_points(poses: cython.double[:, ::1], parents: cython.int[::1], words: cython.schar[::1],
-                lengths: cython.double[:, ::1], radius: cython.double, edges: cython.long[::1], arc_lengths: cython.double[::1],
-                out: cython.double[:, :]):
-    """Write the positions at the arc lengths `arc_lengths` of a tree's `edges` to `out` (m, 2)."""
-    i: cython.Py_ssize_t
-    node: cython.Py_ssize_t
-    parent: cython.Py_ssize_t
-    theta: cython.double
-    with cython.nogil:
-        for i in range(edges.shape[0]):
-            node = edges[i]
-            parent = parents[node]
-            out[i, 0], out[i, 1], theta = along(poses[parent, 0], poses[parent, 1], poses[parent, 2], radius, words[node],
-                                                lengths[node, 0], lengths[node, 1], lengths[node, 2], arc_lengths[i])
+        for i in range(ends.shape[0]):
+            start, end = starts[i], ends[i]
+            pose = along(Pose(poses[start, 0], poses[start, 1], poses[start, 2]), radius,
+                         Curve(words[end], lengths[end, 0], lengths[end, 1], lengths[end, 2]), arc_lengths[i])
+            out[i, 0], out[i, 1], out[i, 2] = pose.x, pose.y, remainder(pose.theta, TWO_PI)

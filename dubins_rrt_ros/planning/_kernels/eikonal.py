@@ -98,10 +98,7 @@ class Eikonal:
             self.find_steepest(steepest)
             self.compress(steepest, heights)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def seed(self, column: cython.double, row: cython.double, reach: cython.double) -> cython.void:
+    def seed(self, column, row, reach):
         """Begin at the nodes of all free squares that are within reach of a place."""
         columns: cython.double = self.width - 3
         rows: cython.double = self.size // self.width - 3
@@ -123,11 +120,7 @@ class Eikonal:
                     self.rank[node] = -1
                     self.relax(node, FLATTER * max(0.0, hypot(j + (corner & 1) - column, i + (corner >> 1) - row) - reach))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def straight_on(self, node: cython.int) -> cython.double:
+    def straight_on(self, node):
         """How far a node is from the target, if there is one."""
         if not self.has_target:
             return 0
@@ -135,19 +128,12 @@ class Eikonal:
         rows: cython.double = node // self.width - self.target_row
         return sqrt(columns * columns + rows * rows)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def ensure_final(self, square: cython.int) -> cython.void:
+    def ensure_final(self, square):
         """Make sure that the nodes of a free square have their costs, if they can be reached."""
         if self.waiting + self.postponed > 0 and not self.is_final(square):
             self.flood_up_to(square)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def flood_up_to(self, square: cython.int) -> cython.void:
+    def flood_up_to(self, square):
         """Raise the limit until the nodes of a square have had their turns, and once more, since others may count for them."""
         while self.waiting + self.postponed > 0 and not self.is_final(square):
             self.until = self.limit + self.rise
@@ -155,19 +141,12 @@ class Eikonal:
         self.until = self.limit + self.rise
         self.flood()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def is_final(self, square: cython.int) -> cython.bint:
+    def is_final(self, square):
         """Whether all nodes of a square have had their turns."""
         return max(max(self.rank[square], self.rank[square + 1]),
                    max(self.rank[square + self.width], self.rank[square + self.width + 1])) < self.size
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def flood(self) -> cython.void:
+    def flood(self):
         """Let costs pass from node to node until none below the limit falls, and note in which order the nodes had their turns;
         raise the limit as far as `until`."""
         node: cython.int
@@ -191,19 +170,12 @@ class Eikonal:
             if self.free[node - self.width] or self.free[node - self.width - 1]:
                 self.pass_on(node, node - self.width)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def pass_on(self, node: cython.int, neighbour: cython.int) -> cython.void:
+    def pass_on(self, node, neighbour):
         """Let the cost of a node count for a neighbour that costs more."""
         if self.falls_behind(neighbour, node):
             self.relax(neighbour, self.update(neighbour, self.gradient[neighbour] if self.has_gradients else 1))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def relax(self, node: cython.int, cost: cython.double) -> cython.void:
+    def relax(self, node, cost):
         """Let a node have a cost that is lower than its own, and wait to pass it on: at once only where it is below the limit."""
         if cost >= self.cost[node] - self.least_fall:
             return
@@ -215,10 +187,7 @@ class Eikonal:
             self.later[self.postponed] = node
             self.postponed += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def raise_limit(self) -> cython.void:
+    def raise_limit(self):
         """Raise the limit, and queue what is below it now."""
         count: cython.int = self.postponed
         node: cython.int
@@ -235,10 +204,7 @@ class Eikonal:
                 self.later[self.postponed] = node
                 self.postponed += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def enqueue(self, item: cython.int) -> cython.void:
+    def enqueue(self, item):
         """Put a node or a square behind all in the queue, unless it is there."""
         if self.state[item] == QUEUED:
             return
@@ -247,10 +213,7 @@ class Eikonal:
         self.queue[end if end < self.size else end - self.size] = item
         self.waiting += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def dequeue(self) -> cython.int:
+    def dequeue(self):
         """Take the first node or square from the queue."""
         item: cython.int = self.queue[self.first]
         self.state[item] = IDLE
@@ -258,10 +221,7 @@ class Eikonal:
         self.waiting -= 1
         return item
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def update(self, node: cython.int, gradient: cython.double) -> cython.double:
+    def update(self, node, gradient):
         """The cost of a node by its neighbours: the least over the free squares around it."""
         before: cython.double = self.cost[node - 1]
         behind: cython.double = self.cost[node + 1]
@@ -280,10 +240,7 @@ class Eikonal:
             least = min(least, upwind(before, below, gradient))
         return least
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def reduce_slopes(self) -> cython.void:
+    def reduce_slopes(self):
         """Solve again, node by node in order, with a gradient that makes up for the steepest square around each."""
         square: cython.int
         node: cython.int
@@ -302,18 +259,11 @@ class Eikonal:
                 self.enqueue(node)
                 self.flood()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.inline
-    @cython.exceptval(check=False)
-    def falls_behind(self, neighbour: cython.int, node: cython.int) -> cython.bint:
+    def falls_behind(self, neighbour, node):
         """Whether a neighbour that had its turn costs more than a node, so that it may be reached from there."""
         return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + self.least_fall
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def find_steepest(self, steepest: cython.double[::1]) -> cython.void:
+    def find_steepest(self, steepest):
         """Find the greatest gradient, and at least 1, of the squares that have each level of the cost."""
         square: cython.int
         level: cython.int
@@ -333,10 +283,7 @@ class Eikonal:
             for level in range(cython.cast(cython.int, LEVELS * low), cython.cast(cython.int, LEVELS * high) + 1):
                 steepest[level] = max(steepest[level], slope)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def compress(self, steepest: cython.double[::1], heights: cython.double[::1]) -> cython.void:
+    def compress(self, steepest, heights):
         """Make every level so much lower that no gradient is above 1; `heights` has room for where they begin."""
         level: cython.int
         node: cython.int
@@ -348,10 +295,7 @@ class Eikonal:
                 level = cython.cast(cython.int, LEVELS * self.cost[node])
                 self.cost[node] = heights[level] + (self.cost[node] - level / LEVELS) / steepest[level]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def steepest(self, square: cython.int) -> cython.double:
+    def steepest(self, square):
         """The greater gradient of a square's triangles, or 1 where it is less."""
         upwards: cython.double
         across: cython.double
@@ -360,11 +304,7 @@ class Eikonal:
         return sqrt(min(upwards, across)) if upwards > 1 and across > 1 else 1.0
 
 
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def squared_slopes(here: cython.double, right: cython.double, above: cython.double,
-                   beyond: cython.double) -> tuple[cython.double, cython.double]:
+def squared_slopes(here, right, above, beyond):
     """The squares of the greater gradients of a square's triangles, if it is split from `here` to `beyond`, and if across."""
     bottom: cython.double = (right - here) * (right - here)
     top: cython.double = (beyond - above) * (beyond - above)

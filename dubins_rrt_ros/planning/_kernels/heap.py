@@ -21,17 +21,11 @@ class Heap:
             capacity = self.count + max(more, self.count)
             self.items, self.keys = resized(self.items, capacity), resized(self.keys, capacity)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def least_key(self) -> cython.double:
+    def least_key(self):
         """The key of the item on top; the heap must not be empty."""
         return self.keys[0]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def push(self, item: cython.int, key: cython.double) -> cython.void:
+    def push(self, item, key):
         """Add an item; there must be room."""
         i: cython.int = self.count
         self.count += 1
@@ -40,10 +34,7 @@ class Heap:
             i = (i - 1) // 2
         self.items[i], self.keys[i] = item, key
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def pop(self) -> cython.int:
+    def pop(self):
         """Take the item with the least key; the heap must not be empty."""
         top: cython.int = self.items[0]
         self.count -= 1

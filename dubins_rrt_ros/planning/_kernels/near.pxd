@@ -1,4 +1,5 @@
 cimport cython
+from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 
 cdef class BackwardNeighbors:
@@ -9,10 +10,8 @@ cdef class BackwardNeighbors:
     cdef double radius_guess
     cdef double typical_radius
     cdef double cost_budget
-    cdef double ahead
-    cdef double x
-    cdef double y
-    cdef double theta
+    cdef double direction
+    cdef Pose pose
     cdef double sin_theta
     cdef double cos_theta
     cdef double[::1] keys
@@ -20,17 +19,20 @@ cdef class BackwardNeighbors:
     cdef signed char[::1] words
     cdef double[:, ::1] lengths
     @cython.final
-    cdef void begin(self, double x, double y, double theta, double neighbor_radius) noexcept nogil
+    cdef void begin(self, Pose pose, double radius) noexcept nogil
     @cython.final
-    cdef void insert(self, int node, int word, double first, double second, double third) noexcept nogil
+    cdef Curve curve_at(self, int i) noexcept nogil
+    @cython.final
+    cdef void write(self, int i, int node, Curve curve, double length) noexcept nogil
+    @cython.final
+    cdef void insert(self, int node, Curve curve) noexcept nogil
     cdef void consider(self, int node, double dx, double dy, double limit) noexcept nogil
     @cython.final
     cdef void consider_bucket(self, int row, int column) noexcept nogil
     @cython.final
     cdef void consider_all(self) noexcept nogil
-    cdef void collect_nearest(self, double x, double y, double theta, int wanted, double within) noexcept nogil
-    cdef void collect_useful(self, double x, double y, double theta, int wanted, double most_cost,
-                             double within) noexcept nogil
+    cdef void collect_nearest(self, Pose pose, int wanted, double max_length) noexcept nogil
+    cdef void collect_useful(self, Pose pose, int wanted, double max_cost, double max_length) noexcept nogil
 
 cdef class ForwardNeighbors(BackwardNeighbors):
-    cdef void collect_cheaper(self, int node, double neighbor_radius, double least_gain) noexcept nogil
+    cdef void collect_cheaper(self, int node, double radius, double least_gain) noexcept nogil

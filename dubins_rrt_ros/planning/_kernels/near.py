@@ -11,28 +11,26 @@ import cython
 import numpy as np
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import NO_CURVE, TWO_PI, shortest_within
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, UNLIMITED, Curve, length_of, shortest_within
     from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
     from cython.cimports.libc.math import cos, fabs, sin, sqrt
 else:
     from math import cos, fabs, sin, sqrt
 
-    from .dubins import NO_CURVE, TWO_PI, shortest_within
+    from .dubins import TWO_PI, UNLIMITED, Curve, length_of, shortest_within
     from .tree import SearchTree
 
 
-#: The next near set is guessed to reach this much farther than the last.
+#: Factor by which the next neighbour radius is guessed to exceed the last one.
 RADIUS_GUESS_FACTOR = cython.declare(cython.double, 1.25)
-#: By what factors it is adapted how far the nearest often are: so one in five of the near sets reaches no farther.
+#: Multiplicative steps of a running 20 % quantile of the neighbour radius.
 RISE = cython.declare(cython.double, 1.1 ** 0.2)
 FALL = cython.declare(cython.double, 1.1 ** 0.8)
-#: No limit of the cost.
-UNLIMITED = cython.declare(cython.double, 1e300)
-#: From the middle of a square to its corners, by its side; a little more.
+#: Half the diagonal of a unit square, rounded up.
 HALF_DIAGONAL = cython.declare(cython.double, 0.7072)
-#: More than the rounding of a place, in turning radii.
+#: Tolerance above the rounding of a position, in turning radii.
 NEARLY = cython.declare(cython.double, 1e-9)
-#: The least guess, in turning radii: it grows by doubling, which must not begin at 0.
+#: Least guess of the neighbour radius, in turning radii: it grows by doubling, which must not begin at 0.
 LEAST_RADIUS_GUESS = cython.declare(cython.double, 1e-3)
 
 
@@ -40,36 +38,32 @@ LEAST_RADIUS_GUESS = cython.declare(cython.double, 1e-3)
 class BackwardNeighbors:
     """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
 
-    `keys` are the lengths of the curves; the first `count` entries of all arrays are in use. Nodes whose curve is not
-    shorter than `neighbor_radius` are of no interest; it shrinks as nodes are found. Neither are those whose curve is not
-    shorter than what their cost leaves of `cost_budget`.
+    The first `count` entries of the arrays are in use: `nodes`, their curves as `words` and `lengths`, and the curves'
+    lengths as `keys`. A node whose curve is not shorter than `neighbor_radius`, which shrinks as nodes are found, is left
+    out; so is one whose curve is not shorter than what its cost leaves of `cost_budget`.
     """
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
         self.tree = tree
         self.count = 0
         self.radius_guess = self.typical_radius = tree.radius
-        self.ahead = -1
+        self.direction = -1
         self.keys = np.empty(capacity)
         self.nodes = np.empty(capacity, np.int32)
         self.words = np.empty(capacity, np.int8)
         self.lengths = np.empty((capacity, 3))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def collect_nearest(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int,
-                        within: cython.double) -> cython.void:
-        """Find the `wanted` nodes with the shortest curves to a pose, of those shorter than `within`, as far as there is room.
+    def collect_nearest(self, pose, wanted, max_length):
+        """Find the `wanted` nodes with the shortest curves to a pose, shorter than `max_length` each, as far as there is room.
 
         A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
         """
         self.wanted = min(min(wanted, self.tree.indexed), cython.cast(cython.int, self.keys.shape[0]))
-        self.begin(x, y, theta, min(self.radius_guess, within))
+        self.begin(pose, min(self.radius_guess, max_length))
         self.consider_all()
-        while self.count < self.wanted and self.radius_guess < within:
+        while self.count < self.wanted and self.radius_guess < max_length:
             self.radius_guess *= 2
-            self.begin(x, y, theta, min(self.radius_guess, within))
+            self.begin(pose, min(self.radius_guess, max_length))
             self.consider_all()
         self.radius_guess = max(RADIUS_GUESS_FACTOR * self.neighbor_radius, LEAST_RADIUS_GUESS * self.tree.radius)
         if self.neighbor_radius > self.typical_radius:
@@ -77,45 +71,43 @@ class BackwardNeighbors:
         else:
             self.typical_radius = self.typical_radius / FALL
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def collect_useful(self, x: cython.double, y: cython.double, theta: cython.double, wanted: cython.int,
-                       most_cost: cython.double, within: cython.double) -> cython.void:
-        """Find the `wanted` nodes with the shortest curves to a pose by which it costs less than `most_cost`, of those no farther
-        than the nearest often are.
+    def collect_useful(self, pose, wanted, max_cost, max_length):
+        """Find the `wanted` nodes with the shortest curves to a pose by which it costs less than `max_cost`, within the typical
+        radius.
 
         Most nodes are too expensive already by the straight line, so that few curves are computed.
         """
         self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
-        self.begin(x, y, theta, min(self.typical_radius, within))
-        self.cost_budget = most_cost
+        self.begin(pose, min(self.typical_radius, max_length))
+        self.cost_budget = max_cost
         self.consider_all()
 
-    @cython.cfunc
-    @cython.final
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def begin(self, x: cython.double, y: cython.double, theta: cython.double, neighbor_radius: cython.double) -> cython.void:
+    def begin(self, pose, radius):
         """Empty the set and set the pose that it is about."""
         self.count = 0
-        self.neighbor_radius = neighbor_radius
+        self.neighbor_radius = radius
         self.cost_budget = UNLIMITED
-        self.x, self.y, self.theta = x, y, theta
-        self.sin_theta, self.cos_theta = sin(theta), cos(theta)
+        self.pose = pose
+        self.sin_theta, self.cos_theta = sin(pose.theta), cos(pose.theta)
 
-    @cython.cfunc
-    @cython.final
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def insert(self, node: cython.int, word: cython.int, first: cython.double, second: cython.double,
-               third: cython.double) -> cython.void:
+    def curve_at(self, i):
+        """Return the curve of the i-th neighbour."""
+        return Curve(self.words[i], self.lengths[i, 0], self.lengths[i, 1], self.lengths[i, 2])
+
+    def write(self, i, node, curve, length):
+        """Make a node and its curve the i-th neighbour."""
+        self.keys[i] = length
+        self.nodes[i] = node
+        self.words[i] = curve.word
+        self.lengths[i, 0], self.lengths[i, 1], self.lengths[i, 2] = curve.first, curve.second, curve.third
+
+    def insert(self, node, curve):
         """Insert a node by the length of its curve; the longest one drops out when there is no more room."""
         if self.count < self.wanted:
             self.count += 1
-        key: cython.double = first + second + third
+        length: cython.double = length_of(curve)
         i: cython.int = self.count - 1
-        while i > 0 and self.keys[i - 1] > key:
+        while i > 0 and self.keys[i - 1] > length:
             self.keys[i] = self.keys[i - 1]
             self.nodes[i] = self.nodes[i - 1]
             self.words[i] = self.words[i - 1]
@@ -123,36 +115,20 @@ class BackwardNeighbors:
             self.lengths[i, 1] = self.lengths[i - 1, 1]
             self.lengths[i, 2] = self.lengths[i - 1, 2]
             i -= 1
-        self.keys[i] = key
-        self.nodes[i] = node
-        self.words[i] = word
-        self.lengths[i, 0] = first
-        self.lengths[i, 1] = second
-        self.lengths[i, 2] = third
+        self.write(i, node, curve, length)
         if self.count == self.wanted:
             self.neighbor_radius = self.keys[self.count - 1]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, limit: cython.double) -> cython.void:
+    def consider(self, node, dx, dy, limit):
         """Take a node, which lies (dx, dy) from the pose, if its curve to the pose is shorter than `limit`."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        word, first, second, third = shortest_within(
+        curve: Curve = shortest_within(
             -dx, -dy, self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1],
-            self.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.tree.rounding, limit)
-        if first < NO_CURVE:
-            self.insert(node, word, first, second, third)
+            self.pose.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.tree.rounding, limit)
+        if curve.first < UNLIMITED:
+            self.insert(node, curve)
 
-    @cython.cfunc
-    @cython.final
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def consider_bucket(self, row: cython.int, column: cython.int) -> cython.void:
-        """Consider the nodes of a bucket that the lower bounds do not rule out: most by their costs and the straight line."""
+    def consider_bucket(self, row, column):
+        """Consider the nodes of a bucket that the lower bounds do not rule out; most are ruled out by cost and straight line."""
         node: cython.int = self.tree.buckets[row, column]
         radius: cython.double = self.tree.radius
         half_circle: cython.double = TWO_PI / 2 * radius
@@ -160,37 +136,34 @@ class BackwardNeighbors:
         dy: cython.double
         limit: cython.double
         if node >= 0 and self.neighbor_radius <= half_circle:
-            dx = self.tree.x0 + (column + 0.5) * self.tree.bucket_size - self.x
-            dy = self.tree.y0 + (row + 0.5) * self.tree.bucket_size - self.y
-            if takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius,
+            dx = self.tree.x0 + (column + 0.5) * self.tree.bucket_size - self.pose.x
+            dy = self.tree.y0 + (row + 0.5) * self.tree.bucket_size - self.pose.y
+            if takes_half_circle(self.direction * dx, self.direction * dy, self.sin_theta, self.cos_theta, radius,
                                  HALF_DIAGONAL * self.tree.bucket_size):
                 return
         while node >= 0:
-            limit = min(self.neighbor_radius, self.cost_budget + self.ahead * self.tree.costs[node])
-            dx = self.tree.poses[node, 0] - self.x
-            dy = self.tree.poses[node, 1] - self.y
-            if (limit > 0 and dx * dx + dy * dy < limit * limit and radius * turned(self.theta, self.tree.poses[node, 2]) < limit
+            limit = min(self.neighbor_radius, self.cost_budget + self.direction * self.tree.costs[node])
+            dx = self.tree.poses[node, 0] - self.pose.x
+            dy = self.tree.poses[node, 1] - self.pose.y
+            if (limit > 0 and dx * dx + dy * dy < limit * limit
+                    and radius * turned(self.pose.theta, self.tree.poses[node, 2]) < limit
                     and not (limit <= half_circle and (
-                        takes_half_circle(self.ahead * dx, self.ahead * dy, self.sin_theta, self.cos_theta, radius, 0)
-                        or takes_half_circle(self.ahead * dx, self.ahead * dy, self.tree.headings[node, 0],
+                        takes_half_circle(self.direction * dx, self.direction * dy, self.sin_theta, self.cos_theta, radius, 0)
+                        or takes_half_circle(self.direction * dx, self.direction * dy, self.tree.headings[node, 0],
                                              self.tree.headings[node, 1], radius, 0)))):
                 self.consider(node, dx, dy, limit)
             node = self.tree.next_in_bucket[node]
 
-    @cython.cfunc
-    @cython.final
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def consider_all(self) -> cython.void:
+    def consider_all(self):
         """Consider the nodes bucket by bucket, in rings around the pose, until a ring is out of reach."""
-        row: cython.int = self.tree.bucket_row(self.y)
-        column: cython.int = self.tree.bucket_column(self.x)
+        row: cython.int = self.tree.bucket_row(self.pose.y)
+        column: cython.int = self.tree.bucket_column(self.pose.x)
         rows: cython.int = cython.cast(cython.int, self.tree.buckets.shape[0])
         columns: cython.int = cython.cast(cython.int, self.tree.buckets.shape[1])
         side: cython.double = self.tree.bucket_size
         # Ring k lies k - 1 buckets beyond the nearest side of the pose's own bucket.
-        u: cython.double = self.x - self.tree.x0 - column * side
-        v: cython.double = self.y - self.tree.y0 - row * side
+        u: cython.double = self.pose.x - self.tree.x0 - column * side
+        v: cython.double = self.pose.y - self.tree.y0 - row * side
         inner: cython.double = min(min(u, side - u), min(v, side - v))
         rings: cython.int = 1 + max(max(row, rows - 1 - row), max(column, columns - 1 - column))
         ring: cython.int
@@ -216,39 +189,24 @@ class ForwardNeighbors(BackwardNeighbors):
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
         BackwardNeighbors.__init__(self, tree, capacity)
-        self.ahead = 1
+        self.direction = 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def collect_cheaper(self, node: cython.int, neighbor_radius: cython.double, least_gain: cython.double) -> cython.void:
-        """Find the nodes that gain more than `least_gain` by a curve shorter than `neighbor_radius` from `node`."""
-        self.begin(self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2], neighbor_radius)
+    def collect_cheaper(self, node, radius, least_gain):
+        """Find the nodes that gain more than `least_gain` by a curve shorter than `radius` from `node`."""
+        self.begin(self.tree.pose_of(node), radius)
         self.cost_budget = -(self.tree.costs[node] + least_gain)
         self.consider_all()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def consider(self, node: cython.int, dx: cython.double, dy: cython.double, limit: cython.double) -> cython.void:
+    def consider(self, node, dx, dy, limit):
         """Take a node if it gains; where there is no more room, the others have to wait for the next chance."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        if self.count >= self.keys.shape[0]:
+        if self.count >= self.nodes.shape[0]:
             return
-        word, first, second, third = shortest_within(
-            dx, dy, self.theta, self.sin_theta, self.cos_theta,
+        curve: Curve = shortest_within(
+            dx, dy, self.pose.theta, self.sin_theta, self.cos_theta,
             self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1], self.tree.radius,
             self.tree.rounding, limit)
-        if first < NO_CURVE:
-            self.nodes[self.count] = node
-            self.words[self.count] = word
-            self.keys[self.count] = first + second + third
-            self.lengths[self.count, 0] = first
-            self.lengths[self.count, 1] = second
-            self.lengths[self.count, 2] = third
+        if curve.first < UNLIMITED:
+            self.write(self.count, node, curve, length_of(curve))
             self.count += 1
 
 
@@ -257,7 +215,7 @@ class ForwardNeighbors(BackwardNeighbors):
 @cython.inline
 @cython.exceptval(check=False)
 def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
-    """The angle between two headings, or 0 where they are too far from [-pi, pi] to tell without a division."""
+    """Return the angle between two headings, or 0 where they are too far from [-pi, pi] to tell without a division."""
     angle: cython.double = fabs(theta1 - theta0)
     if angle > TWO_PI / 2:
         angle = fabs(TWO_PI - angle)
@@ -270,7 +228,7 @@ def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
 @cython.exceptval(check=False)
 def takes_half_circle(x: cython.double, y: cython.double, sine: cython.double, cosine: cython.double, radius: cython.double,
                       slack: cython.double) -> cython.bint:
-    """Whether no curve shorter than half a circle leads to (x, y), nor to what is at most `slack` away from there.
+    """Return whether no curve shorter than half a circle leads to (x, y), nor to anything within `slack` of it.
 
     By the heading at its start, or that at its end: such a curve neither gets behind itself nor into the circles that it could
     turn on there.

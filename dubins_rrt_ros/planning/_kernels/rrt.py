@@ -13,7 +13,17 @@ from .arrays import resized
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.collision import CollisionChecker
     from cython.cimports.dubins_rrt_ros.planning._kernels.cost_to_go import CostToGoKernel
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import TWO_PI, drive, shortest, turn_of
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
+        TWO_PI,
+        UNLIMITED,
+        Curve,
+        Pose,
+        end_of,
+        first_part,
+        length_of,
+        shortest,
+    )
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import edge_cost
     from cython.cimports.dubins_rrt_ros.planning._kernels.near import BackwardNeighbors, ForwardNeighbors
     from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
     from cython.cimports.libc.math import ceil, fabs, log, remainder
@@ -22,17 +32,17 @@ else:
 
     from .collision import CollisionChecker
     from .cost_to_go import CostToGoKernel
-    from .dubins import TWO_PI, drive, shortest, turn_of
+    from .dubins import TWO_PI, UNLIMITED, Curve, Pose, end_of, first_part, length_of, shortest
+    from .edge_cost import edge_cost
     from .near import BackwardNeighbors, ForwardNeighbors
     from .tree import SearchTree
 
-#: A smaller gain is rounding, and no reason to rewire [m].
+#: Least gain that is reason to rewire [m]; a smaller one is rounding.
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
-NO_WAY = cython.declare(cython.double, 1e300)
-#: Where there is a limit to beat, one sample of so many is taken through RRT* in full, which is enough for asymptotic optimality.
-#: The others look for parents that are of use and no farther away than the nearest often are, which is much faster.
+#: Where there is a cost bound, one sample of this many is taken through RRT* in full, which is enough for asymptotic optimality.
+#: All others search only nodes within the typical radius whose cost could still improve the solution, which is much faster.
 SAMPLES_PER_FULL = cython.declare(cython.int, 64)
-#: By how much the sum of a step's arcs may exceed it, relatively.
+#: Relative rounding of the sum of a step's arcs.
 ROUNDING = cython.declare(cython.double, 1e-9)
 
 
@@ -44,53 +54,37 @@ class RrtKernel:
         goal_nodes: the nodes that reach the goal are its first `goal_count`.
     """
 
-    tree: SearchTree
-    body: CollisionChecker
-    step: cython.double
-    longest: cython.double
-    near_factor: cython.double
-    goal_x: cython.double
-    goal_y: cython.double
-    goal_theta: cython.double
-    tolerance_xy: cython.double
-    tolerance_yaw: cython.double
-    closest: BackwardNeighbors
-    to: BackwardNeighbors
-    onward: ForwardNeighbors
-    bounded: cython.bint
-    tried: cython.int
-    limit: cython.double
-    from_start: CostToGoKernel
-    to_goal: CostToGoKernel
-    goal_nodes: cython.int[::1]
-    goal_count = cython.declare(cython.int, visibility="readonly")
-
-    def __init__(self, tree: SearchTree, body: CollisionChecker, step, near_factor, most_near, goal, tolerance_xy, tolerance_yaw):
+    def __init__(self, tree: SearchTree, checker: CollisionChecker, step, near_factor, max_near, goal, tolerance_xy,
+                 tolerance_yaw):
         """
         Args:
-            body: what must be free along every edge.
-            step: the longest new edge [m]; 0 is unlimited.
-            near_factor: near sets have near_factor * log(size) nodes, at most `most_near`.
+            checker: judges every edge.
+            step: maximum length of a new edge [m]; 0 is unlimited.
+            near_factor, max_near: near sets have near_factor * log(size) nodes, at most `max_near`.
             goal: (x, y, theta); tolerance_xy [m] and tolerance_yaw [rad] say what counts as reaching it.
         """
         self.tree = tree
-        self.body, self.step, self.near_factor = body, step, near_factor
-        self.longest = step * (1 + ROUNDING) if step > 0 else NO_WAY
-        self.goal_x, self.goal_y, self.goal_theta = goal
+        self.checker, self.step, self.near_factor = checker, step, near_factor
+        self.max_edge = step * (1 + ROUNDING) if step > 0 else UNLIMITED
+        self.goal = Pose(goal[0], goal[1], goal[2])
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
         self.closest = BackwardNeighbors(tree, 1)
-        self.to = BackwardNeighbors(tree, most_near)
-        self.onward = ForwardNeighbors(tree, most_near)
+        self.backward = BackwardNeighbors(tree, max_near)
+        self.forward = ForwardNeighbors(tree, max_near)
         self.goal_nodes = np.empty(0, np.int32)
         self.goal_count = 0
         self.bounded = False
         self.tried = 0
-        self.limit = NO_WAY
+        self.cost_bound = UNLIMITED
 
-    def set_cost_bound(self, limit: cython.double, from_start: CostToGoKernel, to_goal: CostToGoKernel):
-        """From now on add and attach only what can be on a path shorter than `limit` [m], by distances that none falls below."""
+    def set_cost_bound(self, cost_bound: cython.double, from_start: CostToGoKernel, to_goal: CostToGoKernel):
+        """From now on add and attach only what can be on a path that costs less than `cost_bound` [m].
+
+        Args:
+            from_start, to_goal: lower bounds of the costs from the start and to the goal.
+        """
         self.bounded = True
-        self.limit, self.from_start, self.to_goal = limit, from_start, to_goal
+        self.cost_bound, self.from_start, self.to_goal = cost_bound, from_start, to_goal
 
     def insert_path(self, poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1],
                     end: cython.int):
@@ -103,18 +97,21 @@ class RrtKernel:
         last: cython.int = cython.cast(cython.int, poses.shape[0]) - 1
         node: cython.int = 0
         i: cython.int
+        pose: Pose
+        curve: Curve
         has_others: cython.bint = self.tree.size > 1  # those on the path itself gain nothing
         self.reserve(last)
         with cython.nogil:
             for i in range(1, last + 1):
+                pose = Pose(poses[i, 0], poses[i, 1], poses[i, 2])
+                curve = Curve(words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
                 if i < last or end < 0:
-                    node = self.add(poses[i, 0], poses[i, 1], poses[i, 2], node, words[i],
-                                    lengths[i, 0], lengths[i, 1], lengths[i, 2])
+                    node = self.add(pose, node, curve)
                     if has_others:
-                        self.to.collect_nearest(poses[i, 0], poses[i, 1], poses[i, 2], self.near_count(), self.longest)
-                        self.rewire(node, self.to.neighbor_radius)
-                elif self.tree.costs[node] + (lengths[i, 0] + lengths[i, 1] + lengths[i, 2]) < self.tree.costs[end]:
-                    self.tree.reparent(end, node, words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
+                        self.backward.collect_nearest(pose, self.near_count(), self.max_edge)
+                        self.rewire(node, self.backward.neighbor_radius)
+                elif self.tree.costs[node] + edge_cost(curve) < self.tree.costs[end]:
+                    self.tree.reparent(end, node, curve)
 
     def reserve(self, more: cython.int):
         """Make room for `more` nodes, so that adding them allocates nothing."""
@@ -123,7 +120,7 @@ class RrtKernel:
             self.goal_nodes = resized(self.goal_nodes, 2 * (self.goal_count + more))
 
     def best_goal_node(self) -> int:
-        """The cheapest node that reaches the goal, or -1."""
+        """Return the cheapest node that reaches the goal, or -1."""
         best: cython.int = -1
         i: cython.int
         for i in range(self.goal_count):
@@ -132,145 +129,102 @@ class RrtKernel:
         return best
 
     def rrt(self, samples: cython.double[:, ::1], begin: cython.int, end: cython.int) -> int:
-        """Algorithm 1 over rows of (n, 3) samples; ends with the first path. Returns the row after the last one used."""
+        """Run Algorithm 1 over rows of (n, 3) samples, up to the first path; return the row after the last one used."""
         i: cython.int = begin
         with cython.nogil:
             while i < end and self.goal_count == 0:
-                self.extend(samples[i, 0], samples[i, 1], samples[i, 2])
+                self.extend(Pose(samples[i, 0], samples[i, 1], samples[i, 2]))
                 i += 1
         return i
 
     def rrt_star(self, samples: cython.double[:, ::1], begin: cython.int, end: cython.int) -> int:
-        """Algorithm 2 over rows of (n, 3) samples; pauses at the first path. Returns the row after the last one used."""
+        """Run Algorithm 2 over rows of (n, 3) samples, pausing at the first path; return the row after the last one used."""
         i: cython.int = begin
         had_path: cython.bint = self.goal_count > 0
         with cython.nogil:
             while i < end and (had_path or self.goal_count == 0):
-                self.extend_and_rewire(samples[i, 0], samples[i, 1], samples[i, 2])
+                self.extend_and_rewire(Pose(samples[i, 0], samples[i, 1], samples[i, 2]))
                 i += 1
         return i
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def extend(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
-        """One round of Algorithm 1: find the closest link, steer towards the sample, add unless it collides."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        if self.step == 0 and not self.body.free(x, y, theta):
+    def extend(self, sample):
+        """Run one round of Algorithm 1: find the closest node, steer towards the sample, add unless it collides."""
+        if self.step == 0 and not self.checker.pose_is_free(sample):
             return
-        x, y, theta, word, first, second, third = self.steer(x, y, theta)
-        if self.closest.count == 0 or first + second + third == 0:
+        if not self.steer(sample) or length_of(self.steered) == 0:
             return
-        if self.edge_is_free(self.closest.nodes[0], word, first, second, third):
-            self.add(x, y, theta, self.closest.nodes[0], word, first, second, third)
+        if self.checker.motion_is_free(self.tree.pose_of(self.closest.nodes[0]), self.tree.radius, self.steered):
+            self.add(self.new_pose, self.closest.nodes[0], self.steered)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def extend_and_rewire(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
-        """One round of Algorithm 2: steer, choose the parent among the near nodes, add, rewire the near nodes through it."""
-        word: cython.int = 0
-        first: cython.double = 0
-        second: cython.double = 0
-        third: cython.double = 0
+    def extend_and_rewire(self, pose):
+        """Run one round of Algorithm 2: steer, choose the parent among the near nodes, add, rewire the near nodes through it."""
         if self.step > 0:
-            x, y, theta, word, first, second, third = self.steer(x, y, theta)
-            if self.closest.count == 0:
+            if not self.steer(pose):
                 return
-        if not self.body.free(x, y, theta):
+            pose = self.new_pose
+        if not self.checker.pose_is_free(pose):
             return
-        limit: cython.double = self.limit
+        limit: cython.double = self.cost_bound
         if self.bounded:
-            limit -= self.cost_to_go(x, y, theta)
-            if self.cost_to_come(x, y, theta) >= limit:
+            limit -= self.cost_to_go(pose)
+            if self.cost_to_come(pose) >= limit:
                 return
         self.tried += 1
         if self.bounded and self.tried % SAMPLES_PER_FULL != 0:
-            self.to.collect_useful(x, y, theta, self.near_count(), limit, self.longest)
+            self.backward.collect_useful(pose, self.near_count(), limit, self.max_edge)
         else:
-            self.to.collect_nearest(x, y, theta, self.near_count(), self.longest)
-        if self.step > 0 and (self.to.count == 0 or self.to.keys[self.to.count - 1] > first + second + third):
+            self.backward.collect_nearest(pose, self.near_count(), self.max_edge)
+        if self.step > 0 and (self.backward.count == 0
+                              or self.backward.keys[self.backward.count - 1] > length_of(self.steered)):
             # The edge as it was steered: solved anew, rounding of the pose can make it longer by a full circle.
-            self.to.insert(self.closest.nodes[0], word, first, second, third)
-        if self.to.count == 0:
+            self.backward.insert(self.closest.nodes[0], self.steered)
+        if self.backward.count == 0:
             return
         node: cython.int
-        if self.to.keys[0] == 0:
+        if self.backward.keys[0] == 0:
             # The goal is drawn again and again; once it is in the tree, that is another try to reach it from elsewhere.
-            node = self.to.nodes[0]
-            self.choose_parent(x, y, theta, node, self.tree.costs[node] - LEAST_GAIN)
+            node = self.backward.nodes[0]
+            self.choose_parent(pose, node, self.tree.costs[node] - LEAST_GAIN)
             return
-        neighbor_radius: cython.double = self.to.neighbor_radius
-        node = self.choose_parent(x, y, theta, -1, limit)
+        radius: cython.double = self.backward.neighbor_radius
+        node = self.choose_parent(pose, -1, limit)
         if node >= 0:
-            self.rewire(node, neighbor_radius)
+            self.rewire(node, radius)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def near_count(self) -> cython.int:
-        """How many nodes are near."""
+    def near_count(self):
+        """Return how many nodes are near."""
         return cython.cast(cython.int, ceil(self.near_factor * log(self.tree.indexed + 1)))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def cost_to_go(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.double:
-        """A length that no path from a pose to the goal falls below."""
-        around: cython.double = self.to_goal.at(x, y)
-        if around >= self.limit or self.tolerance_xy > 0 or self.tolerance_yaw > 0:
+    def cost_to_go(self, pose):
+        """Return a lower bound of the cost from a pose to the goal."""
+        around: cython.double = self.to_goal.at(pose.x, pose.y)
+        if around >= self.cost_bound or self.tolerance_xy > 0 or self.tolerance_yaw > 0:
             return around
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        word, first, second, third = shortest(x, y, theta, self.goal_x, self.goal_y, self.goal_theta, self.tree.radius)
-        return max(around, first + second + third)
+        return max(around, edge_cost(shortest(pose, self.goal, self.tree.radius)))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def cost_to_come(self, x: cython.double, y: cython.double, theta: cython.double) -> cython.double:
-        """A length that no path from the start to a pose falls below."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        word, first, second, third = shortest(self.tree.poses[0, 0], self.tree.poses[0, 1], self.tree.poses[0, 2], x, y, theta,
-                                              self.tree.radius)
-        return max(self.from_start.at(x, y), first + second + third)
+    def cost_to_come(self, pose):
+        """Return a lower bound of the cost from the start to a pose."""
+        direct: cython.double = edge_cost(shortest(self.tree.pose_of(0), pose, self.tree.radius))
+        return max(self.from_start.at(pose.x, pose.y), direct)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def steer(self, x: cython.double, y: cython.double, theta: cython.double
-              ) -> tuple[cython.double, cython.double, cython.double, cython.int, cython.double, cython.double, cython.double]:
-        """The pose, and the edge to it, that lies from the closest node towards the sample, at most a step away."""
-        self.closest.collect_nearest(x, y, theta, 1, NO_WAY)
-        node: cython.int = self.closest.nodes[0]
-        word: cython.int = self.closest.words[0]
-        first: cython.double = self.closest.lengths[0, 0]
-        second: cython.double = self.closest.lengths[0, 1]
-        third: cython.double = self.closest.lengths[0, 2]
-        if self.closest.count == 0 or self.step == 0 or first + second + third <= self.step:
-            return x, y, theta, word, first, second, third
-        first = min(first, self.step)
-        second = min(second, self.step - first)
-        third = min(third, self.step - first - second)
-        x, y, theta = self.tree.poses[node, 0], self.tree.poses[node, 1], self.tree.poses[node, 2]
-        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 0), first)
-        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 1), second)
-        x, y, theta = drive(x, y, theta, self.tree.radius, turn_of(word, 2), third)
-        return x, y, remainder(theta, TWO_PI), word, first, second, third
+    def steer(self, sample):
+        """Steer from the closest node towards the sample, at most a step far: to `new_pose`, by the curve `steered`.
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def choose_parent(self, x: cython.double, y: cython.double, theta: cython.double, node: cython.int,
-                      limit: cython.double) -> cython.int:
+        Returns:
+            False where there is no node to steer from.
+        """
+        self.closest.collect_nearest(sample, 1, UNLIMITED)
+        if self.closest.count == 0:
+            return False
+        self.new_pose, self.steered = sample, self.closest.curve_at(0)
+        if self.step == 0 or length_of(self.steered) <= self.step:
+            return True
+        self.steered = first_part(self.steered, self.step)
+        end: Pose = end_of(self.tree.pose_of(self.closest.nodes[0]), self.tree.radius, self.steered)
+        self.new_pose = Pose(end.x, end.y, remainder(end.theta, TWO_PI))
+        return True
+
+    def choose_parent(self, pose, node, limit):
         """Attach the pose by the cheapest free edge from its near nodes, if it then costs less than `limit`.
 
         `node` is the pose's own, or -1 to add one; what is returned is the node, or -1 where no edge serves.
@@ -282,60 +236,41 @@ class RrtKernel:
         parent: cython.int
         while True:
             cheapest, best = limit, -1
-            for i in range(self.to.count):
-                cost = self.tree.costs[self.to.nodes[i]] + self.to.keys[i]
+            for i in range(self.backward.count):
+                if self.backward.keys[i] == UNLIMITED:  # its edge collides
+                    continue
+                cost = self.tree.costs[self.backward.nodes[i]] + edge_cost(self.backward.curve_at(i))
                 if cost < cheapest:
                     cheapest, best = cost, i
             if best < 0:
                 return -1
-            parent = self.to.nodes[best]
-            if self.edge_is_free(parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
-                                 self.to.lengths[best, 2]):
+            parent = self.backward.nodes[best]
+            if self.checker.motion_is_free(self.tree.pose_of(parent), self.tree.radius, self.backward.curve_at(best)):
                 break
-            self.to.keys[best] = NO_WAY
+            self.backward.keys[best] = UNLIMITED
         if node < 0:
-            return self.add(x, y, theta, parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
-                            self.to.lengths[best, 2])
-        self.tree.reparent(node, parent, self.to.words[best], self.to.lengths[best, 0], self.to.lengths[best, 1],
-                           self.to.lengths[best, 2])
+            return self.add(pose, parent, self.backward.curve_at(best))
+        self.tree.reparent(node, parent, self.backward.curve_at(best))
         return node
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def rewire(self, node: cython.int, neighbor_radius: cython.double) -> cython.void:
+    def rewire(self, node, radius):
         """Reroute through `node` each near node that is cheaper so, and free. Its ancestors cannot be cheaper."""
         i: cython.int
         near: cython.int
-        self.onward.collect_cheaper(node, neighbor_radius, LEAST_GAIN)
-        for i in range(self.onward.count):
-            near = self.onward.nodes[i]
-            if (self.tree.costs[node] + self.onward.keys[i] < self.tree.costs[near] - LEAST_GAIN
-                    and self.edge_is_free(node, self.onward.words[i], self.onward.lengths[i, 0], self.onward.lengths[i, 1],
-                                          self.onward.lengths[i, 2])):
-                self.tree.reparent(near, node, self.onward.words[i], self.onward.lengths[i, 0], self.onward.lengths[i, 1],
-                                   self.onward.lengths[i, 2])
+        self.forward.collect_cheaper(node, radius, LEAST_GAIN)
+        for i in range(self.forward.count):
+            near = self.forward.nodes[i]
+            if (self.tree.costs[node] + edge_cost(self.forward.curve_at(i)) < self.tree.costs[near] - LEAST_GAIN
+                    and self.checker.motion_is_free(self.tree.pose_of(node), self.tree.radius, self.forward.curve_at(i))):
+                self.tree.reparent(near, node, self.forward.curve_at(i))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def edge_is_free(self, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
-                     third: cython.double) -> cython.bint:
-        """Whether the curve from a node is free."""
-        return self.body.curve_is_free(self.tree.poses[parent, 0], self.tree.poses[parent, 1], self.tree.poses[parent, 2],
-                                       self.tree.radius, word, first, second, third)
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def add(self, x: cython.double, y: cython.double, theta: cython.double, parent: cython.int, word: cython.int,
-            first: cython.double, second: cython.double, third: cython.double) -> cython.int:
+    def add(self, pose, parent, curve):
         """Add a node, and note it where it reaches the goal."""
-        node: cython.int = self.tree.add(x, y, theta, parent, word, first, second, third)
-        dx: cython.double = x - self.goal_x
-        dy: cython.double = y - self.goal_y
+        node: cython.int = self.tree.add(pose, parent, curve)
+        dx: cython.double = pose.x - self.goal.x
+        dy: cython.double = pose.y - self.goal.y
         if (dx * dx + dy * dy <= self.tolerance_xy * self.tolerance_xy
-                and fabs(remainder(theta - self.goal_theta, TWO_PI)) <= self.tolerance_yaw):
+                and fabs(remainder(pose.theta - self.goal.theta, TWO_PI)) <= self.tolerance_yaw):
             self.goal_nodes[self.goal_count] = node
             self.goal_count += 1
         return node

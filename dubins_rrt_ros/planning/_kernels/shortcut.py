@@ -1,9 +1,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""A path made shorter step by step: by shortcuts and detours of Dubins curves that keep the clearance.
+"""Path smoothing: a path made shorter by random shortcuts and vertex perturbations of Dubins curves that are as free.
 
-A shortcut leaves the path at one place and comes back at a later one by the Dubins curve between the two; a detour does so over a
-pose near the path between the two. Both are taken only where they are shorter than the piece of the path that they replace.
-Detours let a path settle against the obstacles: each pose between two curves finds its best place and heading by trial.
+A shortcut leaves the path at one place and comes back at a later one by the Dubins curve between the two; a vertex perturbation
+does so over a pose near the path between the two. Both are taken only where they are shorter than the piece of the path that they
+replace. Perturbations let a path settle against the obstacles: each pose between two curves finds its best place and heading by
+trial. (S. Sekhavat et al. 1998 for non-holonomic shortcuts; OMPL's PathSimplifier has both.)
 """
 
 import cython
@@ -12,11 +13,16 @@ import numpy as np
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.collision import CollisionChecker
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
-        NO_CURVE,
         TWO_PI,
+        UNLIMITED,
+        Curve,
+        Pose,
+        along,
         drive,
+        length_of,
+        part_of,
         rounding_at,
-        shortest_within,
+        shortest_below,
         turn_of,
     )
     from cython.cimports.libc.math import cos, exp, log, remainder, sin
@@ -24,71 +30,51 @@ else:
     from math import cos, exp, log, remainder, sin
 
     from .collision import CollisionChecker
-    from .dubins import NO_CURVE, TWO_PI, drive, rounding_at, shortest_within, turn_of
+    from .dubins import TWO_PI, UNLIMITED, Curve, Pose, along, drive, length_of, part_of, rounding_at, shortest_below, turn_of
 
-#: A smaller gain is rounding [m].
+#: Least gain that counts [m]; a smaller one is rounding.
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
-#: The shortest pieces of a path that are replaced, in turning radii.
+#: Length of the shortest pieces of a path that are replaced, in turning radii.
 LEAST_SPAN = cython.declare(cython.double, 0.25)
-#: The natural logarithm of how much smaller the finest detours are than the coarsest.
+#: Natural logarithm of the ratio of the coarsest to the finest perturbations.
 FINENESS = cython.declare(cython.double, 7)
-#: After so many tries poses that are of no use any more are left out.
+#: Number of tries after which poses that are no longer of use are left out.
 TRIES_PER_CLEARING = cython.declare(cython.int, 64)
-#: Of the tries that are no shortcuts the share that moves a pose between its neighbours.
-MOVES = cython.declare(cython.double, 0.7)
-#: The most curves that one change puts in: the rest of the one where it leaves the path, and two of a detour.
-MOST_NEW = 3
+#: Share of the perturbations that move a pose between its neighbours.
+VERTEX_SHARE = cython.declare(cython.double, 0.7)
+#: Maximum number of curves that one change puts in: the rest of the one where it leaves the path, and two of a perturbation.
+MAX_NEW = 3
 
 
 @cython.cclass
 class Shortcutter:
-    """A path as a chain of poses, each reached by a curve from the one before.
+    """A path as poses, each reached by a curve from the one before.
 
     Attributes:
-        count: how many poses there are; the first `count` entries of the arrays are in use.
+        count: number of poses; the first `count` entries of the arrays are in use.
         poses: (n, 3): x [m], y [m], theta [rad].
         words, lengths: (n,) and (n, 3): the curves to the poses, in metres; those of the first mean nothing.
         ends: (n,): how far along the path the poses are [m].
     """
 
-    body: CollisionChecker
-    radius: cython.double
-    count = cython.declare(cython.int, visibility="readonly")
-    poses = cython.declare(cython.double[:, ::1], visibility="readonly")
-    words = cython.declare(cython.schar[::1], visibility="readonly")
-    lengths = cython.declare(cython.double[:, ::1], visibility="readonly")
-    ends = cython.declare(cython.double[::1], visibility="readonly")
-    # A change under way: `new` poses from the pose `left` on, the first `kept` of which lie on the path; it leads to x, y, theta.
-    left: cython.int
-    kept: cython.int
-    new: cython.int
-    x: cython.double
-    y: cython.double
-    theta: cython.double
-    from_x: cython.double
-    from_y: cython.double
-    from_theta: cython.double
-    new_poses: cython.double[:, ::1]
-    new_words: cython.schar[::1]
-    new_lengths: cython.double[:, ::1]
-
-    def __init__(self, body: CollisionChecker, radius: cython.double, poses, words, lengths, tries):
+    def __init__(self, checker: CollisionChecker, radius: cython.double, poses, words, lengths, tries):
         """
         Args:
-            body: what is free along the path, and must be along each curve that is put in.
+            checker: judges each curve that is put in; all of the path is free by it.
+            radius: the turning radius [m].
             poses, words, lengths: of the path.
-            tries: room is made for so many.
+            tries: room is made for this many.
         """
-        self.body, self.radius = body, radius
+        self.checker, self.radius = checker, radius
         self.count = len(poses)
         # A change adds two poses at most; between two clearings they are all kept.
-        room = self.count + 2 * tries + MOST_NEW
-        grown_poses, grown_words, grown_lengths = np.empty((room, 3)), np.empty(room, np.int8), np.empty((room, 3))
-        grown_poses[:self.count], grown_words[:self.count], grown_lengths[:self.count] = poses, words, lengths
-        self.poses, self.words, self.lengths = grown_poses, grown_words, grown_lengths
+        room = self.count + 2 * tries + MAX_NEW
+        all_poses, all_words, all_lengths = np.empty((room, 3)), np.empty(room, np.int8), np.empty((room, 3))
+        all_poses[:self.count], all_words[:self.count], all_lengths[:self.count] = poses, words, lengths
+        self.poses, self.words, self.lengths = all_poses, all_words, all_lengths
         self.ends = np.zeros(room)
-        self.new_poses, self.new_lengths = np.empty((2, MOST_NEW, 3))
-        self.new_words = np.empty(MOST_NEW, np.int8)
+        self.new_poses, self.new_lengths = np.empty((2, MAX_NEW, 3))
+        self.new_words = np.empty(MAX_NEW, np.int8)
         self.measure_from(1)
 
     def improve(self, draws: cython.double[:, ::1], shortcuts: cython.double):
@@ -102,19 +88,15 @@ class Shortcutter:
                     self.clear()
             self.clear()
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def try_change(self, direct: cython.bint, where: cython.double, back: cython.double, ahead: cython.double,
-                   across: cython.double, turn: cython.double) -> cython.void:
-        """Try a shortcut or a detour; the draws say where, how far back and ahead, and by how much beside the path."""
+    def try_change(self, direct, where, back, ahead, across, turn):
+        """Try a shortcut or a perturbation; the draws say where, how far back and ahead, and by how much off the path."""
         total: cython.double = self.ends[self.count - 1]
         least: cython.double = LEAST_SPAN * self.radius
         largest_span: cython.double = log(max(total / least, 2.0))
         pose: cython.int
-        if not direct and self.count > 2 and where < MOVES:
-            pose = 1 + cython.cast(cython.int, where / MOVES * (self.count - 2))
-            self.try_detour(self.ends[pose - 1], self.ends[pose], self.ends[pose + 1], back, across, turn)
+        if not direct and self.count > 2 and where < VERTEX_SHARE:
+            pose = 1 + cython.cast(cython.int, where / VERTEX_SHARE * (self.count - 2))
+            self.try_perturbation(self.ends[pose - 1], self.ends[pose], self.ends[pose + 1], back, across, turn)
             return
         middle: cython.double = where * total
         begin: cython.double = max(0.0, middle - least * exp(back * largest_span))
@@ -122,149 +104,104 @@ class Shortcutter:
         if direct:
             self.try_shortcut(begin, end)
         else:
-            # What the draw of where, back and ahead left unused says how fine the detour is.
-            self.try_detour(begin, middle, end, (back + ahead) / 2, across, turn)
+            # What the draw of where, back and ahead left unused says how fine the perturbation is.
+            self.try_perturbation(begin, middle, end, (back + ahead) / 2, across, turn)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def try_shortcut(self, begin: cython.double, end: cython.double) -> cython.void:
+    def try_shortcut(self, begin, end):
         """Go straight from one place along the path to a later one, if that is shorter and free."""
-        x: cython.double
-        y: cython.double
-        theta: cython.double
-        x, y, theta = self.pose_at(end)
+        target: Pose = self.pose_at(end)
         self.leave(begin)
-        if self.drive_to(x, y, theta, end - begin - LEAST_GAIN) and self.new_is_free():
+        if self.drive_to(target, end - begin - LEAST_GAIN) and self.new_is_free():
             self.come_back(end)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def try_detour(self, begin: cython.double, middle: cython.double, end: cython.double, fine: cython.double,
-                   across: cython.double, turn: cython.double) -> cython.void:
+    def try_perturbation(self, begin, middle, end, fine, across, turn):
         """Go over a pose near the one in the middle, if that is shorter and free."""
         size: cython.double = exp(-FINENESS * fine)
-        x: cython.double
-        y: cython.double
-        theta: cython.double
-        x, y, theta = self.pose_at(middle)
+        via: Pose = self.pose_at(middle)
         across *= size * min(end - begin, 2 * self.radius)
-        x -= across * sin(theta)
-        y += across * cos(theta)
-        theta = remainder(theta + turn * size, TWO_PI)
+        via = Pose(via.x - across * sin(via.theta), via.y + across * cos(via.theta), remainder(via.theta + turn * size, TWO_PI))
         limit: cython.double = end - begin - LEAST_GAIN
-        if not self.body.free(x, y, theta):
+        if not self.checker.pose_is_free(via):
             return
         self.leave(begin)
-        if not self.drive_to(x, y, theta, limit):
+        if not self.drive_to(via, limit):
             return
-        limit -= self.new_lengths[self.new - 1, 0] + self.new_lengths[self.new - 1, 1] + self.new_lengths[self.new - 1, 2]
-        x, y, theta = self.pose_at(end)
-        if self.drive_to(x, y, theta, limit) and self.new_is_free():
+        limit -= length_of(self.new_curve(self.new - 1))
+        if self.drive_to(self.pose_at(end), limit) and self.new_is_free():
             self.come_back(end)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def leave(self, s: cython.double) -> cython.void:
+    def leave(self, s):
         """Begin a change `s` along the path."""
         edge: cython.int = self.edge_at(s)
-        x: cython.double
-        y: cython.double
-        theta: cython.double
-        x, y, theta = self.pose_at(s)
-        self.leave_pose(edge if s >= self.ends[edge] else edge - 1, x, y, theta)
+        pose: Pose = self.pose_at(s)
+        self.leave_pose(edge if s >= self.ends[edge] else edge - 1, pose)
         if self.ends[edge - 1] < s < self.ends[edge]:
-            self.append(x, y, theta, self.words[edge])
-            self.write_piece(edge, 0, s - self.ends[edge - 1], self.new_lengths, 0)
+            self.append(pose, part_of(self.curve_to(edge), 0, s - self.ends[edge - 1]))
             self.kept = 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def leave_pose(self, pose: cython.int, x: cython.double, y: cython.double, theta: cython.double) -> cython.void:
-        """Begin a change behind a pose of the chain, at (x, y, theta)."""
+    def leave_pose(self, pose, at):
+        """Begin a change behind a pose of the path, at a place on the curve from it."""
         self.left, self.new, self.kept = pose + 1, 0, 0
-        self.x = self.from_x = x
-        self.y = self.from_y = y
-        self.theta = self.from_theta = theta
+        self.begin = self.at = at
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def drive_to(self, x: cython.double, y: cython.double, theta: cython.double, limit: cython.double) -> cython.bint:
-        """Add the Dubins curve to a pose to the change, if it is shorter than `limit`."""
-        word: cython.int
-        first: cython.double
-        second: cython.double
-        third: cython.double
-        word, first, second, third = shortest_within(x - self.x, y - self.y, self.theta, sin(self.theta), cos(self.theta),
-                                                     theta, sin(theta), cos(theta), self.radius, rounding_at(x, y), limit)
-        if first == NO_CURVE:
+    def drive_to(self, target, limit):
+        """Add the Dubins curve to a pose to the change, if it is shorter than `limit`; return whether it is."""
+        curve: Curve = shortest_below(self.at, target, self.radius, rounding_at(target.x, target.y), limit)
+        if curve.first == UNLIMITED:
             return False
-        self.append(x, y, theta, word)
-        self.new_lengths[self.new - 1, 0] = first
-        self.new_lengths[self.new - 1, 1] = second
-        self.new_lengths[self.new - 1, 2] = third
-        self.x, self.y, self.theta = x, y, theta
+        self.append(target, curve)
+        self.at = target
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def append(self, x: cython.double, y: cython.double, theta: cython.double, word: cython.int) -> cython.void:
-        """Add a pose to the change, reached by a curve whose lengths the caller writes."""
-        self.new_poses[self.new, 0], self.new_poses[self.new, 1], self.new_poses[self.new, 2] = x, y, theta
-        self.new_words[self.new] = word
+    def append(self, pose, curve):
+        """Add a pose to the change, reached by a curve."""
+        self.new_poses[self.new, 0], self.new_poses[self.new, 1], self.new_poses[self.new, 2] = pose.x, pose.y, pose.theta
+        self.new_words[self.new] = curve.word
+        self.new_lengths[self.new, 0] = curve.first
+        self.new_lengths[self.new, 1] = curve.second
+        self.new_lengths[self.new, 2] = curve.third
         self.new += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def new_is_free(self) -> cython.bint:
-        """Whether the curves of the change that are not pieces of the path keep the clearance."""
-        x: cython.double = self.from_x
-        y: cython.double = self.from_y
-        theta: cython.double = self.from_theta
+    def new_curve(self, i):
+        """Return the i-th curve of the change."""
+        return Curve(self.new_words[i], self.new_lengths[i, 0], self.new_lengths[i, 1], self.new_lengths[i, 2])
+
+    def curve_to(self, pose):
+        """Return the curve to a pose of the path."""
+        return Curve(self.words[pose], self.lengths[pose, 0], self.lengths[pose, 1], self.lengths[pose, 2])
+
+    def pose_of(self, pose):
+        """Return a pose of the path by its number."""
+        return Pose(self.poses[pose, 0], self.poses[pose, 1], self.poses[pose, 2])
+
+    def new_is_free(self):
+        """Return whether the curves of the change that are not pieces of the path keep the clearance."""
+        pose: Pose = self.begin
         i: cython.int
         for i in range(self.kept, self.new):
-            if not self.is_free(x, y, theta, self.new_words[i], self.new_lengths[i, 0], self.new_lengths[i, 1],
-                                self.new_lengths[i, 2]):
+            if not self.is_free(pose, self.new_curve(i)):
                 return False
-            x, y, theta = self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2]
+            pose = Pose(self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2])
         return True
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def is_free(self, x: cython.double, y: cython.double, theta: cython.double, word: cython.int, first: cython.double,
-                second: cython.double, third: cython.double) -> cython.bint:
-        """Whether a curve is free. Most that do not are blocked in the middle, so that is looked at first."""
-        px: cython.double
-        py: cython.double
-        ptheta: cython.double
-        px, py, ptheta = drive(x, y, theta, self.radius, turn_of(word, 0), first)
-        px, py, ptheta = drive(px, py, ptheta, self.radius, turn_of(word, 1), second / 2)
-        return (self.body.free(px, py, ptheta)
-                and self.body.curve_is_free(x, y, theta, self.radius, word, first, second, third))
+    def is_free(self, pose, curve):
+        """Return whether a curve is free. Most that are not are blocked in the middle, so that is looked at first."""
+        middle: Pose = drive(pose, self.radius, turn_of(curve.word, 0), curve.first)
+        middle = drive(middle, self.radius, turn_of(curve.word, 1), curve.second / 2)
+        return self.checker.pose_is_free(middle) and self.checker.motion_is_free(pose, self.radius, curve)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def come_back(self, s: cython.double) -> cython.void:
+    def come_back(self, s):
         """Put the change in place of the path from where it left to `s` along it."""
         edge: cython.int = self.edge_at(s)
+        rest: Curve
         if s < self.ends[edge]:
-            self.write_piece(edge, s - self.ends[edge - 1], self.ends[edge] - self.ends[edge - 1], self.lengths, edge)
+            rest = part_of(self.curve_to(edge), s - self.ends[edge - 1], self.ends[edge] - self.ends[edge - 1])
+            self.lengths[edge, 0], self.lengths[edge, 1], self.lengths[edge, 2] = rest.first, rest.second, rest.third
         else:
             edge += 1
         self.put_in(edge)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def put_in(self, tail: cython.int) -> cython.void:
+    def put_in(self, tail):
         """Put the change between the pose where it left and the pose `tail`."""
         self.move_tail(tail, self.left + self.new)
         i: cython.int
@@ -276,38 +213,18 @@ class Shortcutter:
                 self.lengths[self.left + i, part] = self.new_lengths[i, part]
         self.measure_from(self.left)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def write_piece(self, edge: cython.int, begin: cython.double, end: cython.double, out: cython.double[:, ::1],
-                    row: cython.int) -> cython.void:
-        """Write the lengths of the arcs of a curve from `begin` to `end` along it to a row of `out`."""
-        passed: cython.double = 0
-        length: cython.double
-        part: cython.int
-        for part in range(3):
-            length = self.lengths[edge, part]
-            out[row, part] = max(0.0, min(end, passed + length) - max(begin, passed))
-            passed += length
-
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def clear(self) -> cython.void:
+    def clear(self):
         """Leave out the poses whose neighbours are joined by a free curve that is no longer than the way over them."""
         pose: cython.int = 1
         while pose < self.count - 1:
-            self.leave_pose(pose - 1, self.poses[pose - 1, 0], self.poses[pose - 1, 1], self.poses[pose - 1, 2])
-            if (self.drive_to(self.poses[pose + 1, 0], self.poses[pose + 1, 1], self.poses[pose + 1, 2],
-                              self.ends[pose + 1] - self.ends[pose - 1] + LEAST_GAIN) and self.new_is_free()):
+            self.leave_pose(pose - 1, self.pose_of(pose - 1))
+            if (self.drive_to(self.pose_of(pose + 1), self.ends[pose + 1] - self.ends[pose - 1] + LEAST_GAIN)
+                    and self.new_is_free()):
                 self.put_in(pose + 2)
             else:
                 pose += 1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def move_tail(self, begin: cython.int, to: cython.int) -> cython.void:
+    def move_tail(self, begin, to):
         """Move the poses from `begin` on so that they begin at `to`."""
         moved: cython.int = self.count - begin
         i: cython.int
@@ -318,10 +235,7 @@ class Shortcutter:
                 self.copy(self.count - 1 - i, to + moved - 1 - i)
         self.count = to + moved
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def copy(self, pose: cython.int, to: cython.int) -> cython.void:
+    def copy(self, pose, to):
         """Write a pose and the curve to it over another."""
         part: cython.int
         self.words[to] = self.words[pose]
@@ -329,20 +243,14 @@ class Shortcutter:
             self.poses[to, part] = self.poses[pose, part]
             self.lengths[to, part] = self.lengths[pose, part]
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def measure_from(self, first: cython.int) -> cython.void:
+    def measure_from(self, first):
         """Sum up how far along the path the poses from `first` on are."""
         i: cython.int
         for i in range(first, self.count):
-            self.ends[i] = self.ends[i - 1] + (self.lengths[i, 0] + self.lengths[i, 1] + self.lengths[i, 2])
+            self.ends[i] = self.ends[i - 1] + length_of(self.curve_to(i))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def edge_at(self, s: cython.double) -> cython.int:
-        """The pose whose curve holds the place `s` along the path, the first one of two."""
+    def edge_at(self, s):
+        """Return the pose whose curve holds the place `s` along the path, the first one of two."""
         low: cython.int = 1
         high: cython.int = self.count - 1
         middle: cython.int
@@ -354,24 +262,14 @@ class Shortcutter:
                 high = middle
         return low
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def pose_at(self, s: cython.double) -> tuple[cython.double, cython.double, cython.double]:
-        """The pose `s` along the path; where one of the chain is, exactly that."""
+    def pose_at(self, s):
+        """Return the pose `s` along the path; where one of its poses is, exactly that."""
         edge: cython.int = self.edge_at(s)
         if s >= self.ends[edge]:
-            return self.poses[edge, 0], self.poses[edge, 1], self.poses[edge, 2]
-        x: cython.double = self.poses[edge - 1, 0]
-        y: cython.double = self.poses[edge - 1, 1]
-        theta: cython.double = self.poses[edge - 1, 2]
+            return self.pose_of(edge)
+        start: Pose = self.pose_of(edge - 1)
         s -= self.ends[edge - 1]
         if s <= 0:
-            return x, y, theta
-        length: cython.double
-        part: cython.int
-        for part in range(3):
-            length = min(s, self.lengths[edge, part])
-            x, y, theta = drive(x, y, theta, self.radius, turn_of(self.words[edge], part), length)
-            s -= length
-        return x, y, remainder(theta, TWO_PI)
+            return start
+        pose: Pose = along(start, self.radius, self.curve_to(edge), s)
+        return Pose(pose.x, pose.y, remainder(pose.theta, TWO_PI))

@@ -1,3 +1,5 @@
+from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
+
 cdef class SearchTree:
     cdef readonly int size
     cdef readonly int indexed
@@ -7,6 +9,7 @@ cdef class SearchTree:
     cdef double[:, ::1] headings
     cdef readonly int[::1] parents
     cdef readonly double[::1] costs
+    cdef double[::1] edge_costs
     cdef readonly signed char[::1] words
     cdef readonly double[:, ::1] lengths
     cdef int[::1] first_child
@@ -19,10 +22,10 @@ cdef class SearchTree:
     cdef double bucket_size
     cdef double x_extent
     cdef double y_extent
-    cdef int add(self, double x, double y, double theta, int parent, int word,
-                 double first, double second, double third) noexcept nogil
-    cdef void reparent(self, int node, int parent, int word, double first, double second, double third) noexcept nogil
-    cdef void attach(self, int node, int parent, int word, double first, double second, double third) noexcept nogil
+    cdef Pose pose_of(self, int node) noexcept nogil
+    cdef int add(self, Pose pose, int parent, Curve curve) noexcept nogil
+    cdef void reparent(self, int node, int parent, Curve curve) noexcept nogil
+    cdef void attach(self, int node, int parent, Curve curve) noexcept nogil
     cdef void update_costs_below(self, int root) noexcept nogil
     cdef void index(self, int node) noexcept nogil
     cdef int bucket_row(self, double y) noexcept nogil

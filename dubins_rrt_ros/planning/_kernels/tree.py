@@ -7,12 +7,14 @@ import numpy as np
 from .arrays import resized
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import rounding_at
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import Curve, Pose, rounding_at
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import edge_cost
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
-    from .dubins import rounding_at
+    from .dubins import Curve, Pose, rounding_at
+    from .edge_cost import edge_cost
 
 #: About how many buckets there are at first. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
 BUCKETS = 1024
@@ -52,11 +54,11 @@ class SearchTree:
         self.poses = np.empty((0, 3))
         self.headings = np.empty((0, 2))
         self.parents = self.first_child = self.next_sibling = self.previous_sibling = self.next_in_bucket = np.empty(0, np.int32)
-        self.costs = np.empty(0)
+        self.costs = self.edge_costs = np.empty(0)
         self.words = np.empty(0, np.int8)
         self.lengths = np.empty((0, 3))
         self.reserve(64)
-        self.add(root[0], root[1], root[2], -1, 0, 0, 0, 0)
+        self.add(Pose(root[0], root[1], root[2]), -1, Curve(0, 0, 0, 0))
 
     def reserve(self, more: cython.int):
         """Make room for `more` nodes, so that adding them allocates nothing."""
@@ -66,7 +68,7 @@ class SearchTree:
         self.poses = resized(self.poses, capacity)
         self.headings = resized(self.headings, capacity)
         self.parents = resized(self.parents, capacity)
-        self.costs = resized(self.costs, capacity)
+        self.costs, self.edge_costs = resized(self.costs, capacity), resized(self.edge_costs, capacity)
         self.words = resized(self.words, capacity)
         self.lengths = resized(self.lengths, capacity)
         self.first_child = resized(self.first_child, capacity)
@@ -74,34 +76,27 @@ class SearchTree:
         self.previous_sibling = resized(self.previous_sibling, capacity)
         self.next_in_bucket = resized(self.next_in_bucket, capacity)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def bucket_row(self, y: cython.double) -> cython.int:
-        """The row of the bucket that holds `y`, the nearest outside the map."""
+    def bucket_row(self, y):
+        """Return the row of the bucket that holds `y`, the nearest outside the map."""
         row: cython.int = cython.cast(cython.int, (y - self.y0) / self.bucket_size)
         return min(max(row, 0), cython.cast(cython.int, self.buckets.shape[0]) - 1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def bucket_column(self, x: cython.double) -> cython.int:
-        """The column of the bucket that holds `x`, the nearest outside the map."""
+    def bucket_column(self, x):
+        """Return the column of the bucket that holds `x`, the nearest outside the map."""
         column: cython.int = cython.cast(cython.int, (x - self.x0) / self.bucket_size)
         return min(max(column, 0), cython.cast(cython.int, self.buckets.shape[1]) - 1)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def attach(self, node: cython.int, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
-               third: cython.double) -> cython.void:
+    def pose_of(self, node):
+        """Return the pose of a node."""
+        return Pose(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
+
+    def attach(self, node, parent, curve):
         """Make `node`, which has no parent, a child of `parent`."""
         self.parents[node] = parent
-        self.words[node] = word
-        self.lengths[node, 0] = first
-        self.lengths[node, 1] = second
-        self.lengths[node, 2] = third
-        self.costs[node] = self.costs[parent] + (first + second + third)
+        self.words[node] = curve.word
+        self.lengths[node, 0], self.lengths[node, 1], self.lengths[node, 2] = curve.first, curve.second, curve.third
+        self.edge_costs[node] = edge_cost(curve)
+        self.costs[node] = self.costs[parent] + self.edge_costs[node]
         sibling: cython.int = self.first_child[parent]
         self.first_child[parent] = node
         self.next_sibling[node] = sibling
@@ -109,33 +104,24 @@ class SearchTree:
         if sibling >= 0:
             self.previous_sibling[sibling] = node
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def add(self, x: cython.double, y: cython.double, theta: cython.double, parent: cython.int, word: cython.int,
-            first: cython.double, second: cython.double, third: cython.double) -> cython.int:
+    def add(self, pose, parent, curve):
         """Add a node and return it; room must have been reserved. The root is added with the parent -1."""
         node: cython.int = self.size
         self.size += 1
-        self.poses[node, 0] = x
-        self.poses[node, 1] = y
-        self.poses[node, 2] = theta
-        self.headings[node, 0] = sin(theta)
-        self.headings[node, 1] = cos(theta)
+        self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = pose.x, pose.y, pose.theta
+        self.headings[node, 0] = sin(pose.theta)
+        self.headings[node, 1] = cos(pose.theta)
         self.first_child[node] = -1
         if parent < 0:
             self.parents[node] = self.next_sibling[node] = self.previous_sibling[node] = -1
-            self.costs[node] = self.words[node] = 0
+            self.costs[node] = self.edge_costs[node] = self.words[node] = 0
             self.lengths[node, 0] = self.lengths[node, 1] = self.lengths[node, 2] = 0
         else:
-            self.attach(node, parent, word, first, second, third)
+            self.attach(node, parent, curve)
         self.index(node)
         return node
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def index(self, node: cython.int) -> cython.void:
+    def index(self, node):
         """Put a node into its bucket."""
         row: cython.int = self.bucket_row(self.poses[node, 1])
         column: cython.int = self.bucket_column(self.poses[node, 0])
@@ -174,11 +160,7 @@ class SearchTree:
         shape = (int(self.y_extent / self.bucket_size) + 1, int(self.x_extent / self.bucket_size) + 1)
         self.buckets = np.full(shape, -1, dtype=np.int32)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def reparent(self, node: cython.int, parent: cython.int, word: cython.int, first: cython.double, second: cython.double,
-                 third: cython.double) -> cython.void:
+    def reparent(self, node, parent, curve):
         """Move `node` with all its descendants below `parent`, which must be none of them; their costs follow."""
         before: cython.int = self.previous_sibling[node]
         after: cython.int = self.next_sibling[node]
@@ -188,18 +170,14 @@ class SearchTree:
             self.first_child[self.parents[node]] = after
         if after >= 0:
             self.previous_sibling[after] = before
-        self.attach(node, parent, word, first, second, third)
+        self.attach(node, parent, curve)
         self.update_costs_below(node)
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def update_costs_below(self, root: cython.int) -> cython.void:
+    def update_costs_below(self, root):
         """Recompute the costs of all descendants of `root`, in preorder along the links, without a stack."""
         node: cython.int = self.first_child[root]
         while node >= 0:
-            self.costs[node] = self.costs[self.parents[node]] + (
-                self.lengths[node, 0] + self.lengths[node, 1] + self.lengths[node, 2])
+            self.costs[node] = self.costs[self.parents[node]] + self.edge_costs[node]
             if self.first_child[node] >= 0:
                 node = self.first_child[node]
                 continue

@@ -28,21 +28,6 @@ START = cython.declare(cython.schar, 5)
 class WidestPathSearch:
     """A flood over a lattice; node `row * columns + column` lies `column` steps along and `row` steps across from the first."""
 
-    clearance: Clearance
-    rows: cython.int
-    columns: cython.int
-    x0: cython.double
-    y0: cython.double
-    along_x: cython.double
-    along_y: cython.double
-    least: cython.double
-    level: cython.double
-    is_target: cython.schar[::1]
-    entered: cython.schar[::1]
-    queue: cython.int[::1]
-    queued: cython.int
-    heap: Heap
-
     def __init__(self, clearance: Clearance, first, along, shape, is_target, least, enough):
         """
         Args:
@@ -71,10 +56,7 @@ class WidestPathSearch:
             target = self.flood(start)
         return (self.level, self.nodes_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def flood(self, start: cython.int) -> cython.int:
+    def flood(self, start):
         """Flood from `start` until a target is reached, and return it, or -1."""
         node: cython.int
         row: cython.int
@@ -101,10 +83,7 @@ class WidestPathSearch:
                 self.enter(node - self.columns, FROM_ABOVE)
         return -1
 
-    @cython.cfunc
-    @cython.nogil
-    @cython.exceptval(check=False)
-    def enter(self, node: cython.int, how: cython.schar) -> cython.void:
+    def enter(self, node, how):
         """Let an unseen node wait in the queue or the heap, if it has more than the least clearance."""
         if self.entered[node] != UNSEEN:
             return

@@ -88,25 +88,25 @@ class ClearanceField:
             out[~shapely.contains_xy(self._polygons, points[..., 0], points[..., 1])] = 0
         return out
 
-    def body(self, vehicle: Vehicle) -> CollisionChecker:
-        """The vehicle's body on the map, for one thread."""
+    def collision_checker(self, vehicle: Vehicle) -> CollisionChecker:
+        """Return the checker of a vehicle's motions on the map, for one thread."""
         if not vehicle.footprint:
             return CollisionChecker(self.kernel, vehicle.robot_radius)
         found = cover(vehicle.footprint)
-        return PolygonChecker(self.kernel, vehicle.inscribed_radius, found.discs, found.corners, found.first_corner,
-                           max(found.excess, 2 * CLEARANCE_MARGIN))
+        return PolygonChecker(self.kernel, vehicle.inscribed_radius, discs=found.discs, corners=found.corners,
+                              first_corner=found.first_corner, worth=max(found.excess, 2 * CLEARANCE_MARGIN))
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
         """Whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
         # The kernel's distance to polygons has no sign.
-        return bool(self.at(np.array(pose[:2])) > 0) and self.body(vehicle).is_free(*pose)
+        return bool(self.at(np.array(pose[:2])) > 0) and self.collision_checker(vehicle).is_pose_free(pose)
 
     def curve_is_free(self, curve: DubinsCurve, vehicle: Vehicle) -> bool:
         """Whether the vehicle touches no obstacle along a curve; see `_kernels/clearance.py` and `_kernels/collision.py`."""
         # What starts in free space stays there, as no edge is crossed.
         if not self.at(np.array(curve.start[:2])) > 0:
             return False
-        return self.body(vehicle).is_curve_free(*curve.start, curve.radius, WORDS.index(curve.word), *curve.lengths)
+        return self.collision_checker(vehicle).is_motion_free(curve.start, curve.radius, WORDS.index(curve.word), curve.lengths)
 
     def cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and columns of the raster's cells that hold (..., 2) points of the map."""

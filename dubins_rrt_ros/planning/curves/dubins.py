@@ -79,7 +79,7 @@ class DubinsCurve:
         """
         if not 0 <= s <= self.length:
             raise ValueError(f"s is {s} m; the curve is {self.length} m long, so give 0 to {self.length}")
-        return _kernel.pose_along(*self.start, self.radius, WORDS.index(self.word), *self.lengths, s)
+        return _kernel.pose_along(self.start, self.radius, WORDS.index(self.word), self.lengths, s)
 
     def poses(self, spacing: float) -> np.ndarray:
         """(n, 3) float64 poses at most `spacing` [m] apart, both ends and the joints between the arcs included.
@@ -98,7 +98,7 @@ class DubinsCurve:
                 begin += length
         stations = np.concatenate(stations)
         out = np.empty((len(stations), 3))
-        _kernel.poses_along(*self.start, self.radius, WORDS.index(self.word), *self.lengths, stations, out)
+        _kernel.poses_along(self.start, self.radius, WORDS.index(self.word), self.lengths, stations, out)
         return out
 
     def check(self) -> None:
@@ -133,7 +133,7 @@ def shortest(start: Pose, goal: Pose, radius: float) -> DubinsCurve:
         start, goal: (x [m], y [m], theta [rad]).
         radius: the turning radius [m].
     """
-    word, *lengths = _kernel.shortest_curve(*start, *goal, radius)
+    word, *lengths = _kernel.shortest_curve(start, goal, radius)
     return DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
 
 

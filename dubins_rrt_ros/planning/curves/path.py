@@ -118,8 +118,8 @@ class Path:
         arc_lengths = shares * self.lengths[1:].sum()
         curves = np.minimum(np.searchsorted(ends, arc_lengths), len(ends) - 1)
         out = np.empty((len(arc_lengths), 3))
-        _kernel.chain_poses(self.waypoints, self.words, self.lengths, self.radius, curves,
-                            arc_lengths - np.append(0.0, ends)[curves], out)
+        _kernel.path_poses(self.waypoints, self.words, self.lengths, self.radius, curves, curves + 1,
+                           arc_lengths - np.append(0.0, ends)[curves], out)
         return out
 
     def cut(self, longest: float) -> "Path":
@@ -138,7 +138,7 @@ class Path:
         count = max(1, math.ceil(lengths.sum() / longest * (1 - ROUNDING)))
         bounds = lengths.sum() * np.arange(count + 1) / count
         ends = np.empty((count + 1, 3))
-        _kernel.poses_along(*self.waypoints[i - 1], self.radius, self.words[i], *lengths, bounds, ends)
+        _kernel.poses_along(self.waypoints[i - 1], self.radius, self.words[i], lengths, bounds, ends)
         ends[-1] = self.waypoints[i]
         before = np.concatenate([[0.0], np.cumsum(lengths)])
         within = np.clip(bounds[:, None], before[:-1], before[1:]) - before[:-1]

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .._kernels import UNLIMITED
 from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
 from ..curves.angles import wrap
@@ -41,7 +42,7 @@ class HybridAStarRuns:
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: DistanceField):
         self._problem, self._field, self._to_goal = problem, field, to_goal
-        self._body = field.body(problem.vehicle)
+        self._checker = field.collision_checker(problem.vehicle)
         self._settings = settings
         self._goals = _goals(problem)
         self._current: HybridAStar | None = None
@@ -90,9 +91,12 @@ class HybridAStarRuns:
         arc, sectors, weight = self._measures(best is None)
         problem, radius = self._problem, self._problem.vehicle.turning_radius
         corners = problem.map.corners()
-        return HybridAStar(self._body, radius, problem.start, self._goals, self._to_goal.kernel, corners.min(axis=0),
-                           np.ptp(corners, axis=0), arc * radius, sectors, weight, FIRST_VISIT_PENALTY if best is None else 0.0,
-                           1e300 if best is None else SLACK * best, MOST_EXPANDED)
+        first = best is None
+        return HybridAStar(
+            checker=self._checker, radius=radius, start=problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
+            corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=sectors, weight=weight,
+            visit_penalty=FIRST_VISIT_PENALTY if first else 0.0, limit=UNLIMITED if first else SLACK * best,
+            max_expanded=MOST_EXPANDED)
 
     def _measures(self, first: bool) -> tuple[float, int, float]:
         """The length of the next run's arcs in turning radii, its headings, and its weight of the cost-to-go."""

@@ -76,8 +76,9 @@ class Search:
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
         self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
-        self._grower = RrtKernel(self._tree, field.body(vehicle), settings.step_size, NEAR_FACTOR, MOST_NEAR,
-                              problem.goal, problem.goal_tolerance_xy, problem.yaw_tolerance)
+        self._grower = RrtKernel(
+            tree=self._tree, checker=field.collision_checker(vehicle), step=settings.step_size, near_factor=NEAR_FACTOR,
+            max_near=MOST_NEAR, goal=problem.goal, tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
         self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
         self._problem, self._settings, self._field, self._to_goal = problem, settings, field, to_goal
         self._beside = Beside()

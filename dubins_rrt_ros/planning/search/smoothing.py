@@ -21,7 +21,8 @@ def polished(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random
         fresh: whether it was not polished before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    polisher = Shortcutter(field.body(vehicle), path.radius, path.waypoints, path.words, path.lengths, TRIES)
-    polisher.improve(draws, FRESH if fresh else KNOWN)
-    arrays = (np.array(view[:polisher.count]) for view in (polisher.poses, polisher.words, polisher.lengths))
+    shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius, poses=path.waypoints,
+                              words=path.words, lengths=path.lengths, tries=TRIES)
+    shortcutter.improve(draws, FRESH if fresh else KNOWN)
+    arrays = (np.array(view[:shortcutter.count]) for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
     return Path(*arrays, path.radius)

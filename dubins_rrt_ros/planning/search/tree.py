@@ -73,10 +73,11 @@ class Tree:
         nth = np.arange(len(arc)) - (np.cumsum(pieces) - pieces)[arc]
         begins = (np.cumsum(self.lengths, axis=1) - self.lengths).ravel()
         piece = self.lengths.ravel()[arc] / pieces[arc]
-        out = np.empty((len(arc), 2, 2))
+        out, poses, nodes = np.empty((len(arc), 2, 2)), np.empty((len(arc), 3)), arc // 3
         for end in (0, 1):
-            _dubins.edge_points(self.poses, self.parents, self.words, self.lengths, self.radius, arc // 3,
-                                begins[arc] + (nth + end) * piece, out[:, end])
+            _dubins.path_poses(self.poses, self.words, self.lengths, self.radius, self.parents[nodes].astype(nodes.dtype), nodes,
+                               begins[arc] + (nth + end) * piece, poses)
+            out[:, end] = poses[:, :2]
         return out
 
     def check(self, field: ClearanceField | None = None, vehicle: Vehicle | None = None) -> None:
