@@ -1,4 +1,4 @@
-"""`dubins_rrt audit`: judge a path, whoever planned it."""
+"""`dubins_rrt audit`: judge a path, whoever planned it, by the audit alone, which shares no algorithm with the planner."""
 
 import argparse
 import math
@@ -14,23 +14,30 @@ from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 from dubins_rrt_ros.planning.text import quoted
 
-from .bench.problems import read_json
+from .common.documents import read_json
 from .common.example import ENDS, MAP
 from .common.flags import add_option_flags, given_options
 from .common.output import check_folder, finite, words_for, write_document
 from .common.parser import Parser, UsageError, add_json_flag, describe
-from .common.request import MAX_MAP_CELLS, read_map
+from .common.request import add_map_arguments, read_map
 
-#: How far poses may be off by default [m, rad]: ample for four digits behind the point.
+#: Default tolerances of poses [m, rad]: ample for four digits behind the point.
 TOLERANCE_XY, TOLERANCE_YAW = 1e-3, 1e-3
-#: The largest number in a pose that is taken [m, rad].
+#: Largest number in a pose that is taken [m, rad].
 LARGEST = 1e6
-#: What a flag of the vehicle takes the place of, where a plan has it.
-_REPLACES = {"turning_radius": {"wheelbase": 0.0, "max_steering_angle": 0.0}, "robot_radius": {"footprint": ""}}
+#: Options of a plan's vehicle that a flag overrides, and their values then.
+_OVERRIDES: Mapping[str, Mapping[str, Any]] = {
+    "turning_radius": {"wheelbase": 0.0, "max_steering_angle": 0.0}, "robot_radius": {"footprint": ""}}
 
 
 class Verdict(NamedTuple):
-    """What was judged: the problem and the path's length [m]; and what was found."""
+    """The verdict on a path.
+
+    Attributes:
+        problem: the problem that the path should solve.
+        length: the length of the path [m].
+        audit: what the audit found.
+    """
 
     problem: Problem
     length: float
@@ -53,14 +60,10 @@ def add_arguments(parser: Parser) -> None:
         exit_status="0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage")
     parser.argument_default = argparse.SUPPRESS
     parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
-    parser.add_argument("map", metavar="MAP",
-                        help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze")
+    add_map_arguments(parser)
     add_json_flag(parser, "the verdict")
-    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
-                        help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
-    pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW")}
-    parser.add_argument("--start", **pose, help="where the path shall begin [m, m, rad]; by default where a plan says")
-    parser.add_argument("--goal", **pose, help="where it shall end [m, m, rad]; by default where a plan says")
+    for name, text in (("--start", "pose at which the path must begin"), ("--goal", "pose at which it must end")):
+        parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), help=f"{text} [m, m, rad]; default: the plan's")
     _add_tolerances(parser.add_argument_group("poses"))
     for title, cls in (("vehicle", Vehicle), ("request", Problem)):
         add_option_flags(parser, title, cls)
@@ -68,15 +71,16 @@ def add_arguments(parser: Parser) -> None:
 
 def _add_tolerances(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--tolerance-xy", metavar="m", type=float, default=TOLERANCE_XY,
-                       help="how far a stretch of poses may run to the side or back, besides what --tolerance-yaw allows; what "
-                            f"poses are off their arcs is added to the clearance needed [m]; default {TOLERANCE_XY:g}")
+                       help="distance by which poses may deviate sideways or backwards from an arc, in addition to what "
+                            "--tolerance-yaw allows; the deviation is added to the required clearance [m]; "
+                            f"default {TOLERANCE_XY:g}")
     group.add_argument("--tolerance-yaw", metavar="rad", type=float, default=TOLERANCE_YAW,
-                       help="how much more than the turning radius allows a stretch of poses may turn, and by what angle it may "
-                            f"run to the side [rad]; default {TOLERANCE_YAW:g}")
+                       help="angle by which poses may turn more than the turning radius allows, and by which they may run "
+                            f"sideways [rad]; default {TOLERANCE_YAW:g}")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Judge, report, and return the exit status."""
+    """Judge the path, report, and return the exit status."""
     check_folder(arguments.json)
     for name in ("tolerance_xy", "tolerance_yaw"):
         if not 0 <= getattr(arguments, name) < math.inf:
@@ -90,40 +94,41 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _judge(arguments: argparse.Namespace) -> Verdict:
     document = read_json(arguments.path)
-    map, _ = read_map(arguments.map, arguments.max_map_cells)
+    world_map, _ = read_map(arguments.map, arguments.max_map_cells)
     try:
-        judge = _judge_plan if isinstance(document, Mapping) and "curves" in document else _judge_poses
-        return judge(document, map, arguments)
+        if isinstance(document, Mapping) and "curves" in document:
+            return _judge_plan(document, world_map, arguments)
+        return _judge_poses(document, world_map, arguments)
     except (PlanFileError, InvalidPose) as error:
         raise UsageError(f"{arguments.path}: {error}") from error
 
 
-def _judge_plan(document: Mapping[str, Any], map: Map, arguments: argparse.Namespace) -> Verdict:
-    problem, _ = read_request(document, map)
+def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse.Namespace) -> Verdict:
+    problem, _ = read_request(document, world_map)
     path = read_path(document)
     if path is None:
         raise PlanFileError(f"it holds no path but {quoted(document.get('error_name'))}; there is nothing to judge")
     given = given_options(arguments, Vehicle)
-    replaced = {name: value for flag in given for name, value in _REPLACES.get(flag, {}).items()}
+    replaced = {name: value for flag in given for name, value in _OVERRIDES.get(flag, {}).items()}
     problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments),
                       **given_options(arguments, Problem))
     return Verdict(problem, path.length, audit_path(path, problem))
 
 
-def _judge_poses(document: Any, map: Map, arguments: argparse.Namespace) -> Verdict:
+def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:
     poses = _poses(document)
     ends = {"start": poses[0], "goal": poses[-1]} | _ends(arguments)
-    problem = Problem(map, Vehicle(**given_options(arguments, Vehicle)), **ends, **given_options(arguments, Problem))
+    problem = Problem(world_map, Vehicle(**given_options(arguments, Vehicle)), **ends, **given_options(arguments, Problem))
     return Verdict(problem, driven_length(poses), audit_poses(poses, problem, arguments.tolerance_xy, arguments.tolerance_yaw))
 
 
-def _ends(arguments: argparse.Namespace) -> dict[str, list[float]]:
-    """The start and the goal, where they were given."""
+def _ends(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the start and the goal, where they were given."""
     return {name: getattr(arguments, name) for name in ("start", "goal") if name in arguments}
 
 
 def _poses(document: Any) -> np.ndarray:
-    """(n, 3) the poses in a document."""
+    """Read the (n, 3) poses of a document."""
     poses = document.get("poses") if isinstance(document, Mapping) else document
     if not (isinstance(poses, list) and poses):
         raise PlanFileError('it holds no poses; give [[x, y, yaw], ...] or {"poses": [[x, y, yaw], ...]}, one pose at least')
@@ -135,18 +140,18 @@ def _poses(document: Any) -> np.ndarray:
 
 
 def _sentence(file: str, verdict: Verdict) -> str:
-    """The verdict with its figures."""
+    """Say the verdict, with its figures, in a sentence."""
     found = verdict.audit
     count = f"fails with {len(found.findings)} finding{'s' * (len(found.findings) > 1)}"
     vehicle = verdict.problem.vehicle
-    need = "of its footprint" if vehicle.footprint else f"for a robot radius of {vehicle.robot_radius:g} m"
+    required = "of its footprint" if vehicle.footprint else f"for a robot radius of {vehicle.robot_radius:g} m"
     return (f"{file} {'passes' if found.ok else count}: length {verdict.length:.3f} m, least clearance "
-            f"{found.min_clearance:.4f} m {need}, greatest curvature {found.max_curvature:.4f} 1/m for a turning radius of "
+            f"{found.min_clearance:.4f} m {required}, greatest curvature {found.max_curvature:.4f} 1/m for a turning radius of "
             f"{vehicle.turning_radius:g} m.")
 
 
 def _document(verdict: Verdict, map_name: str) -> dict[str, Any]:
-    """The verdict as what JSON can hold."""
+    """Return the verdict as JSON holds it."""
     problem, found = verdict.problem, verdict.audit
     return {"ok": found.ok, "findings": list(found.findings), "length": verdict.length,
             "min_clearance": found.min_clearance, "max_curvature": found.max_curvature,

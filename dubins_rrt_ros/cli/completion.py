@@ -1,7 +1,7 @@
 """`dubins_rrt completion`: the script with which a shell completes the commands, flags, map names and files of `dubins_rrt`.
 
-All words are written into the script: to ask the program at each press of the tab key, as argcomplete does, takes a second of
-imports. The names of maps alone are listed when they are asked for.
+All words are written into the script, since to ask the program at each press of the tab key, as argcomplete does, would take
+half a second of imports. Only the names of maps are listed when they are asked for.
 """
 
 import argparse
@@ -15,9 +15,9 @@ from dubins_rrt_ros.planning.maps.locate import maps_directory
 from .commands import COMMANDS, load_arguments
 from .common.parser import Parser, describe
 
-#: What is completed where the help asks for these.
+#: Kinds of words to complete, by the placeholder that the help shows for them.
 _KINDS = {"MAP": "@map", "DIR": "@folder", "FILE": "@file", "PATH.json": "@file", "PROBLEMS.json": "@file"}
-#: How many words a flag takes that takes any number.
+#: Number of words of a flag that takes any number of them.
 _MANY = 999
 
 _BASH = """\
@@ -87,12 +87,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class _Place(NamedTuple):
-    """Where a command takes words.
+    """A place of a command's line at which words may stand.
 
     Attributes:
-        names: of the flag that they follow; or the number of the place, where they follow none.
-        words: how many; none after a switch.
-        offer: what may stand there: words, or @map, @file or @folder, or nothing that is known.
+        names: the names of the flag that the words follow; or the number of the place, where they follow none.
+        words: number of words; none after a switch.
+        offer: the words to offer, or @map, @file or @folder, or "" where nothing is known.
         help: the first clause of the help.
     """
 
@@ -106,8 +106,8 @@ def _places(parser: argparse.ArgumentParser) -> Iterator[_Place]:
     number = 0
     for action in parser._actions:
         number += not action.option_strings
-        words = {None: 1, "?": 1, "+": _MANY}.get(action.nargs, action.nargs)
-        offer = " ".join(action.choices or [_KINDS.get(action.metavar, "")])
+        words = action.nargs if isinstance(action.nargs, int) else _MANY if action.nargs == "+" else 1
+        offer = " ".join(action.choices or [_KINDS.get(str(action.metavar), "")])
         yield _Place(list(action.option_strings) or [str(number)], words, offer, re.split(r" \[| \(|[;:,]", action.help or "")[0])
 
 
@@ -116,7 +116,7 @@ def _flags(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def _list_maps() -> str:
-    """The shell command that lists the installed maps, those of today and those that come."""
+    """Return the shell command that lists the installed maps at the time it runs."""
     return f"command ls {shlex.quote(str(maps_directory()))} 2>/dev/null | sed -n 's/[.]yaml$//p; /[.]geojson$/p; /[.]wkt$/p'"
 
 
@@ -144,12 +144,12 @@ def _fish(parsers: Mapping[str, Parser]) -> Iterator[str]:
         condition = f"complete -c dubins_rrt -n '__fish_seen_subcommand_from {name}'"
         for place in _places(parser):
             flags = "".join(f" -l {name[2:]}" for name in place.names if name.startswith("--"))
-            help = f" -d {_fish_quoted(place.help)}" if flags else ""
-            yield condition + flags + (" -r" if flags and place.words else "") + _fish_offer(place) + help
+            text = f" -d {_fish_quoted(place.help)}" if flags else ""
+            yield condition + flags + (" -r" if flags and place.words else "") + _fish_offer(place) + text
 
 
 def _fish_offer(place: _Place) -> str:
-    """The options of `complete` for what may stand at a place."""
+    """Return the options of fish's `complete` for what may stand at a place."""
     if not place.words:
         return ""
     files, words = {"": ("-f", ""), "@file": ("-F", ""), "@folder": ("-f", "(__fish_complete_directories)"),

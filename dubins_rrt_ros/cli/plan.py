@@ -1,4 +1,4 @@
-"""`dubins_rrt plan`: plan one path, and report it, write it, draw it."""
+"""`dubins_rrt plan`: plan one path, report it, write it to files and draw it."""
 
 import argparse
 import contextlib
@@ -7,7 +7,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from types import FrameType
+from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
 
@@ -16,19 +17,20 @@ from .common.flags import add_option_flags, given_options
 from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
-from .common.request import MAX_MAP_CELLS, Request, read_map, read_replay
+from .common.request import LoadedRequest, add_map_arguments, read_map, read_replay
 
 
 class _Replay(argparse.Action):
-    """Takes the file, and asks no more for what is in it."""
+    """The flag --replay, with which the arguments that its file contains are no longer required."""
 
-    def __init__(self, *, holds: tuple[argparse.Action, ...], **keywords: Any):
+    def __init__(self, *, contained: list[argparse.Action], **keywords: Any):
         super().__init__(**keywords)
-        self.holds = holds
+        self.contained = contained
 
-    def __call__(self, parser, namespace, values, option_string=None):
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
         namespace.replay = values
-        for action in self.holds:
+        for action in self.contained:
             action.required = False
 
 
@@ -42,17 +44,14 @@ def add_arguments(parser: Parser) -> None:
                   "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'"],
         notes="The first Ctrl-C ends the search with the best path so far.",
         exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, 130 interrupted")
-    pose = {"nargs": 3, "type": float, "metavar": ("X", "Y", "YAW"), "required": True, "default": argparse.SUPPRESS}
-    request = (parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
-                                   help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze"),
-               parser.add_argument("--start", **pose, help="where the vehicle is [m, m, rad]"),
-               parser.add_argument("--goal", **pose, help="where it shall be [m, m, rad]"))
-    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
-                        help=f"the largest grid that is taken; default {MAX_MAP_CELLS}")
+    required = [add_map_arguments(parser)]
+    for name, text in (("--start", "start pose of the vehicle"), ("--goal", "goal pose of the vehicle")):
+        required.append(parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), required=True,
+                                            default=argparse.SUPPRESS, help=f"{text} [m, m, rad]"))
     add_json_flag(parser, "the plan, also without a path,")
-    parser.add_argument("--csv", metavar="FILE", help="write the path's poses as x,y,theta")
+    parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x,y,theta")
     parser.add_argument("--plot", metavar="FILE", help="draw map, tree and path; .png, .svg or .pdf")
-    parser.add_argument("--replay", metavar="FILE", action=_Replay, holds=request,
+    parser.add_argument("--replay", metavar="FILE", action=_Replay, contained=required,
                         help="plan the request of a file that --json wrote again, in place of all other options: with "
                              "its seed and as many samples as it drew, and no time limit, so that the path is the same")
     for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
@@ -60,7 +59,7 @@ def add_arguments(parser: Parser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Plan, write the files, and return the exit status."""
+    """Plan, report, write the files, and return the exit status."""
     check_folder(arguments.json, arguments.csv, arguments.plot)
     check_drawing(arguments.plot)
     request = _request(arguments)
@@ -72,35 +71,35 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if answer.path else 1
 
 
-def _request(arguments: argparse.Namespace) -> Request:
+def _request(arguments: argparse.Namespace) -> LoadedRequest:
     if arguments.replay is None:
         return _new_request(arguments)
-    besides = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", "max_map_cells"}
-    if besides:
-        raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(besides))}")
+    others = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", "max_map_cells"}
+    if others:
+        raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(others))}")
     return read_replay(arguments.replay, arguments.max_map_cells)
 
 
-def _new_request(arguments: argparse.Namespace) -> Request:
+def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
     vehicle = Vehicle(**given_options(arguments, Vehicle))
     settings = Settings(**given_options(arguments, Settings))
-    map, load_time = read_map(arguments.map, arguments.max_map_cells)
-    problem = Problem(map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
-    return Request(arguments.map, problem, settings, load_time)
+    world_map, load_time = read_map(arguments.map, arguments.max_map_cells)
+    problem = Problem(world_map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
+    return LoadedRequest(arguments.map, problem, settings, load_time)
 
 
 @contextlib.contextmanager
 def _interrupt() -> Iterator[Callable[[], bool]]:
-    """Let the first Ctrl-C ask the planner for the best path so far; the second interrupts as ever."""
-    asked = threading.Event()
+    """Let the first Ctrl-C end the search with the best path so far; the second interrupts the process."""
+    interrupted = threading.Event()
 
-    def ask(signum, frame):
+    def interrupt(signum: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, before)
-        asked.set()
+        interrupted.set()
 
-    before = signal.signal(signal.SIGINT, ask)
+    before = signal.signal(signal.SIGINT, interrupt)
     try:
-        yield asked.is_set
+        yield interrupted.is_set
     finally:
         signal.signal(signal.SIGINT, before)
 
@@ -127,7 +126,7 @@ def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:
         draw_plan(arguments.plot, answer)
 
 
-def _report(answer: Plan, request: Request, out: Any) -> None:
+def _report(answer: Plan, request: LoadedRequest, out: TextIO) -> None:
     if answer.path is None:
         print(f"{int(answer.status)} {answer.status.name}: {answer.message}", file=sys.stderr)
         return
@@ -138,7 +137,7 @@ def _report(answer: Plan, request: Request, out: Any) -> None:
 
 
 def _more_figures(answer: Plan) -> str:
-    """What a message of success leaves out: it has length, gap, samples and planning time."""
+    """Return the figures that the message of a path leaves out: it has length, gap, samples and planning time."""
     return (f"Lower bound {answer.lower_bound:.2f} m, first path after {answer.time_to_first:.3g} s, "
             f"{len(answer.tree)} tree nodes, least clearance {answer.min_clearance:.3g} m, "
             f"seed {answer.settings.seed}.")

@@ -1,4 +1,4 @@
-"""`dubins_rrt render`: the grid of a polygon map, as files that map_server reads."""
+"""`dubins_rrt render`: rasterise a polygon map into the pair of files that map_server reads."""
 
 import argparse
 import math
@@ -9,9 +9,9 @@ from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
 from .common.example import ENDS, MAP
 from .common.output import check_folder, words_for, write_document
 from .common.parser import Parser, UsageError, add_json_flag, describe
-from .common.request import find_map
+from .common.request import find_map_or_suggest
 
-#: Each cell is a polygon while it is judged, a few hundred bytes.
+#: Maximum number of cells: each is a polygon of a few hundred bytes while it is tested.
 MAX_CELLS = 4_000_000
 
 
@@ -19,22 +19,22 @@ def add_arguments(parser: Parser) -> None:
     """Give the parser the flags and the help of the command."""
     describe(
         parser, usage="MAP [options]",
-        description="Makes the grid of a polygon map and writes it as map_server's YAML and image. A cell is occupied "
-                    "where it meets an obstacle, be it with a corner.",
+        description="Rasterises a polygon map and writes the grid as map_server's YAML and image. A cell is occupied if "
+                    "any part of it, even a corner, touches an obstacle.",
         examples=[f"dubins_rrt render {MAP}.geojson --resolution 0.1 --out grids", f"dubins_rrt plan grids/{MAP}.yaml {ENDS}"],
         exit_status="0 done, 2 wrong usage")
     parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt), or an installed one's name")
     parser.add_argument("--resolution", metavar="m", type=float, default=0.05,
-                        help="the side of a cell [m]; default 0.05")
-    parser.add_argument("--out", metavar="DIR", help="where to write; by default beside the polygon map, and the pair of an "
-                                                     "installed one here")
+                        help="side of a cell [m]; default 0.05")
+    parser.add_argument("--out", metavar="DIR", help="folder to write to; default: that of the polygon map, or the current "
+                                                     "one for an installed map")
     add_json_flag(parser, "the files' names, and the grid's measures,")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the pair and say so."""
+    """Write the pair, report, and return the exit status."""
     check_folder(arguments.json)
-    source = find_map(arguments.map)
+    source = find_map_or_suggest(arguments.map)
     folder = Path(arguments.out or (source.parent if Path(arguments.map).is_file() else "."))
     grid = rasterise(_polygons(source, arguments.resolution), arguments.resolution)
     folder.mkdir(parents=True, exist_ok=True)
@@ -52,15 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _polygons(source: Path, resolution: float) -> PolygonMap:
-    """The polygon map, where a grid of it has a sensible size."""
+    """Load the polygon map, unless its grid would be too large."""
     if not (math.isfinite(resolution) and resolution > 0):
         raise UsageError(f"--resolution is {resolution:g}; it must be a positive number of metres")
-    map = load_map(source)
-    if not isinstance(map, PolygonMap):
+    polygon_map = load_map(source)
+    if not isinstance(polygon_map, PolygonMap):
         raise UsageError(f"{source} is a grid already; give a polygon map (.geojson or .wkt)")
-    low, high = map.corners()[[0, 2]]
+    low, high = polygon_map.corners()[[0, 2]]
     cells = math.prod(float(side) / resolution + 2 for side in high - low)
     if cells > MAX_CELLS:
         raise UsageError(f"--resolution {resolution:g} makes a grid of {cells:.2g} cells from {source}; at most "
                          f"{MAX_CELLS:g} are made, so give a coarser one")
-    return map
+    return polygon_map

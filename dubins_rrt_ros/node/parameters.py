@@ -8,6 +8,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
+from dubins_rrt_ros.planning.maps.files import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 
 
@@ -24,7 +25,7 @@ class NodeOptions:
                                     "followed; map_file may be elsewhere; empty: any")
     global_frame: str = option("map", "the frame of map, poses and path")
     map_transient_local: bool = option(True, "the map topic's publisher is transient local, as map_server's is")
-    max_map_cells: int = option(100_000_000, "the largest map that is taken", unit="cells", low=1, high=2**31 - 1)
+    max_map_cells: int = option(MAX_MAP_CELLS, "the largest map that is taken", unit="cells", low=1, high=2**31 - 1)
     publish_tree: bool = option(True, "show the tree on ~/tree while somebody subscribes")
     replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
                                                "is no longer free")

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from dubins_rrt_ros.cli.bench import report as bench_report
 from dubins_rrt_ros.cli.bench.plots import sample_cost
-from dubins_rrt_ros.cli.bench.records import run_of
+from dubins_rrt_ros.cli.bench.records import parse_record
 from dubins_rrt_ros.cli.common.plots import GOAL, PATH
 from dubins_rrt_ros.cli.main import main
 
@@ -191,15 +191,15 @@ def test_what_a_sample_costs_is_drawn_for_each_budget():
     runs = [run("yard", label, seed, (0.1, 10), total_s=total, samples=samples, vertices=samples // 5)
             for label, samples, total in (("few", 1000, 0.02), ("many", 10_000, 0.3)) for seed, total in enumerate(
                 (total, total, 2 * total))]
-    assert sample_cost([run_of(line) for line in runs[:3]]) == (200, pytest.approx(20))
-    assert sample_cost([run_of(line) for line in runs[3:]]) == (2000, pytest.approx(30))
+    assert sample_cost([parse_record(line) for line in runs[:3]]) == (200, pytest.approx(20))
+    assert sample_cost([parse_record(line) for line in runs[3:]]) == (2000, pytest.approx(30))
     report(write([*runs, *RUNS[4:]]), "--plot-samples", "samples.svg")
     text = Path("samples.svg").read_text()
     assert "<!-- yard -->" in text and "<!-- pond -->" not in text
 
 
-def test_runs_that_tell_no_samples_are_not_drawn_in_vain(capsys):
-    assert "tells its samples" in refusal(write(RUNS), "--plot-samples", "samples.svg", "--out", "report.md", capsys=capsys)
+def test_runs_that_do_not_say_their_samples_are_refused(capsys):
+    assert "says its samples" in refusal(write(RUNS), "--plot-samples", "samples.svg", "--out", "report.md", capsys=capsys)
     assert not Path("samples.svg").exists()
 
 

@@ -56,7 +56,7 @@ def test_problems(folder, content):
 def test_replay(folder, content):
     (folder / "plan.json").write_bytes(content)
     request = read_or_refused(lambda: read_replay(str(folder / "plan.json"), 10_000),
-                              PlanFileError, OptionError, InvalidPose, MapError)
+                              UsageError, PlanFileError, OptionError, InvalidPose, MapError)
     assert request is None or request.path is None or isinstance(request.path, Path)
 
 

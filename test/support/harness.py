@@ -18,7 +18,7 @@ class NodeProcess:
     """The installed planner as a process of its own."""
 
     def __init__(self, namespace: str, arguments: list[str], command: list[str] | None = None):
-        from dubins_rrt_ros.planning.maps.locate import planner_command
+        from dubins_rrt_ros.cli.demo.process import planner_command
 
         self.name = f"{namespace}/planner"
         self._process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""`dubins_rrt bench`: plan a file of problems with many seeds, and compare what several planners did."""
+"""`dubins_rrt bench`: plan a file of problems with many seeds, and compare the runs of several planners."""
 
 import argparse
 import contextlib
@@ -8,29 +8,29 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dubins_rrt_ros.planning import Settings, options
+from dubins_rrt_ros.planning import Settings
 from dubins_rrt_ros.planning.option import option
 
-from ..common.flags import add_option_flags, given_options
+from ..common.flags import add_option_flags, given_options, largest
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
 from .problems import chosen, read_cases
-from .records import Best, Runs, best_known, grouped, read_best_known, read_runs, run_of
+from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
-from .runs import Task, results
+from .runs import BenchRun, measure_all
 
 DEFAULT_TIME = 5.0
-_HIGHEST = {item.name: item.high for item in options(Settings)}
-#: The arguments that a report takes, and those of every call; all others are for measuring.
-_OF_REPORT, _OF_ALL = {"report", "best_known", "plot", "plot_samples"}, {"command", "run", "out", "json"}
+MAX_SAMPLES, MAX_TIME = largest(Settings, "samples"), largest(Settings, "planning_time")
+#: Arguments of a report, and arguments of either use; all others are for measuring.
+_OF_REPORT, _OF_BOTH = {"report", "best_known", "plot", "plot_samples"}, {"command", "run", "out", "json"}
 
 
 @dataclass(frozen=True)
 class _Flags(Settings):
-    """The settings with flags of their own names; those that are no option() here, the bench sets in its own way."""
+    """The settings that have flags here; those that are no option() are set by the bench in its own way."""
 
-    samples: int = option(_HIGHEST["samples"], "how many samples are drawn at most", low=1, high=_HIGHEST["samples"])
+    samples: int = option(MAX_SAMPLES, "maximum number of samples", low=1, high=MAX_SAMPLES)
     planning_time: float = DEFAULT_TIME
     path_spacing: float = 0.0
     seed: int = 0
@@ -63,28 +63,28 @@ def add_arguments(parser: Parser) -> None:
 def _add_measuring(group: argparse._ArgumentGroup) -> None:
     group.add_argument("file", metavar="PROBLEMS.json", nargs="?",
                        help="a list of {name, map (relative to the file), start, goal, turning_radius, robot_radius}")
-    group.add_argument("--problems", metavar="NAME[,NAME]", help="only these; default all")
-    group.add_argument("--seeds", metavar="N", type=int, help="plan each problem with the seeds 0 to N-1; default 1")
+    group.add_argument("--problems", metavar="NAME[,NAME]", help="names of the problems to plan; default: all")
+    group.add_argument("--seeds", metavar="N", type=int, help="number of seeds per problem, from 0 to N-1; default 1")
     group.add_argument("--time", metavar="s", type=float,
-                       help=f"the time limit of a run [s]; default {DEFAULT_TIME:g}, or none where --samples is given")
+                       help=f"time limit of a run [s]; default {DEFAULT_TIME:g}, or none if --samples is given")
     group.add_argument("--jobs", metavar="N", type=int,
-                       help="run in N processes; default 1, for processes that share cores spoil each other's timings")
-    group.add_argument("--label", metavar="NAME", help="the name of these runs in a report; default the planner's")
+                       help="number of processes; default 1, since processes that share cores distort each other's timings")
+    group.add_argument("--label", metavar="NAME", help="name of these runs in a report; default: the planner")
 
 
 def _add_report(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--report", metavar="FILE", nargs="+", help="compare the runs in these files, in place of measuring")
+    group.add_argument("--report", metavar="FILE", nargs="+", help="compare the runs in these files instead of measuring")
     group.add_argument("--best-known", metavar="FILE",
-                       help="the shortest known lengths, {problem: m}; by default the best of the runs")
+                       help="file of the shortest known lengths, {problem: m}; default: the best of the runs")
     group.add_argument("--plot", metavar="FILE", help="draw cost over time; .png, .svg or .pdf")
     group.add_argument("--plot-samples", metavar="FILE",
-                       help="draw what a sample costs over the size of the tree, a point for each label; .png, .svg or .pdf")
+                       help="draw time per sample over the size of the tree, a point for each label; .png, .svg or .pdf")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure or report, and return the exit status."""
     given = vars(arguments)
-    if "report" in given and (measuring := given.keys() - _OF_ALL - _OF_REPORT):
+    if "report" in given and (measuring := given.keys() - _OF_BOTH - _OF_REPORT):
         raise UsageError(f"--report compares runs that are done and measures none; leave out {_flags(measuring)}")
     if "report" not in given and (reporting := given.keys() & _OF_REPORT):
         raise UsageError(f"{_flags(reporting)} goes with --report alone; leave it out to measure")
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_outputs(given: dict[str, Any]) -> None:
-    """Refuse files that cannot be written, or that would be written over before they are read."""
+    """Refuse files that cannot be written, or that would be overwritten before they are read."""
     out, plots = given.get("out"), [given.get("plot"), given.get("plot_samples")]
     check_folder(out, *plots, given["json"])
     for plot in plots:
@@ -108,21 +108,21 @@ def _flags(names: Iterable[str]) -> str:
 
 
 def _measure(arguments: argparse.Namespace) -> int:
-    tasks, jobs = _tasks(arguments), _count(arguments, "jobs")
+    planned, jobs = _planned_runs(arguments), _count(arguments, "jobs")
     lines = []
-    with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(results(tasks, jobs)) as running:
-        for line in with_bar(running, len(tasks), " runs"):
+    with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(measure_all(planned, jobs)) as measured:
+        for line in with_bar(measured, len(planned), " runs"):
             out.write(json.dumps(line, allow_nan=False) + "\n")
             out.flush()
             lines.append(line)
-    runs = grouped(map(run_of, lines))
+    runs = grouped(map(parse_record, lines))
     _write_json(arguments.json, runs, best_known(runs, {}))
     print(summary(runs), file=words_for(arguments.json))
     return 0 if all(line["solved"] for line in lines) else 1
 
 
-def _tasks(arguments: argparse.Namespace) -> list[Task]:
-    """The runs in order, those of a problem after each other."""
+def _planned_runs(arguments: argparse.Namespace) -> list[BenchRun]:
+    """List the runs, those of a problem after each other."""
     missing = [name for name, key in (("PROBLEMS.json", "file"), ("--out", "out")) if key not in arguments]
     if missing:
         raise UsageError(f"{' and '.join(missing)} must be given, to measure; or --report, to compare")
@@ -131,13 +131,13 @@ def _tasks(arguments: argparse.Namespace) -> list[Task]:
     if "problems" in arguments:
         cases = chosen(cases, arguments.problems.split(","))
     label = getattr(arguments, "label", settings.planner)
-    return [Task(case, replace(settings, seed=seed), label) for case in cases for seed in seeds]
+    return [BenchRun(case, replace(settings, seed=seed), label) for case in cases for seed in seeds]
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
     given = given_options(arguments, _Flags)
-    time = getattr(arguments, "time", _HIGHEST["planning_time"] if "samples" in given else DEFAULT_TIME)
-    return Settings(**{"samples": _HIGHEST["samples"], "planning_time": time} | given)
+    time = getattr(arguments, "time", MAX_TIME if "samples" in given else DEFAULT_TIME)
+    return Settings(**{"samples": MAX_SAMPLES, "planning_time": time, **given})
 
 
 def _count(arguments: argparse.Namespace, name: str) -> int:
@@ -151,7 +151,7 @@ def _report(given: dict[str, Any]) -> int:
     runs = read_runs(given["report"])
     best = best_known(runs, read_best_known(given["best_known"]) if "best_known" in given else {})
     if "plot" in given:
-        from .plots import draw_runs  # here, for matplotlib takes long to import
+        from .plots import draw_runs  # here, since matplotlib is slow to import
         draw_runs(given["plot"], runs, best)
     if "plot_samples" in given:
         from .plots import draw_sample_costs

@@ -1,8 +1,9 @@
-"""Pictures of runs: how near to the best known length planners come over time, and what a sample costs as the tree grows."""
+"""Pictures of `dubins_rrt bench`: cost above the best known over time, and time per sample over the size of the tree."""
 
 import math
 from collections.abc import Collection, Mapping
 from itertools import cycle, product
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +12,15 @@ from matplotlib.lines import Line2D
 
 from ..common.parser import UsageError
 from ..common.plots import CULPRIT, DPI, GOAL, PATH, START
-from .records import Best, Run, Runs
+from .records import Best, RunRecord, Runs
 from .report import quantile, ratio
 
-#: Colours of Okabe and Ito's palette, without the yellow, too pale for lines; after the last follows the next kind of line.
-COLOURS, LINES = (PATH, GOAL, START, CULPRIT, "#cc79a7", "#56b4e9", "#000000"), ("-", "--", ":")
-#: Panels side by side, the sides of one, and a row of the legend [inch].
+#: Colours of Okabe and Ito's palette, without the yellow, which is too pale; after the last colour the next line style follows.
+COLOURS = (PATH, GOAL, START, CULPRIT, "#cc79a7", "#56b4e9", "#000000")
+LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+#: Number of panels side by side; width and height of one, and height of a row of the legend [inch].
 COLUMNS, WIDTH, HEIGHT, ROW = 3, 3.3, 2.4, 0.3
-#: The axes: from when on [s], and cost / best known - 1, where all that is less than LEAST is drawn there.
+#: Ranges of the axes: the earliest time [s], and cost / best known - 1, below which costs are drawn at LEAST.
 EARLIEST, LEAST, MOST = 1e-3, 1e-3, 2.0
 TIMES = {0.001: "1 ms", 0.01: "10 ms", 0.1: "0.1 s", 1: "1 s", 10: "10 s", 100: "100 s", 1000: "1000 s"}
 COSTS = {LEAST: "≤ 0.1 %", 0.01: "1 %", 0.1: "10 %", 1: "100 %"}
@@ -26,7 +28,7 @@ INSTANTS = 400
 
 
 def draw_runs(file: str, runs: Runs, best: Mapping[str, Best]) -> None:
-    """Draw the medians and quartiles of the planners' costs, a panel for each problem, in the format of the file's ending."""
+    """Draw medians and quartiles of the planners' costs, a panel for each problem; the file's ending selects the format."""
     names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
     styles = [(colour, line) for line, colour in product(LINES, COLOURS)]
     style_of = {name: styles[i % len(styles)] for i, name in enumerate(names)}
@@ -42,30 +44,32 @@ def draw_runs(file: str, runs: Runs, best: Mapping[str, Best]) -> None:
 
 
 def draw_sample_costs(file: str, runs: Runs) -> None:
-    """Draw what a sample cost over the size of the tree, and how that would grow from its lowest point on if it grew as the
-    logarithm: lines for each problem, with a point for each planner, meant to be the same one with one budget and another.
+    """Draw the time per sample over the size of the tree, and a logarithm through its minimum for comparison.
+
+    Each problem has a line with a point for each label, which is meant to be one planner with different budgets.
 
     Raises:
-        UsageError: no run tells how many samples were drawn and how many nodes the tree has.
+        UsageError: no run says its number of samples and of nodes.
     """
     figure = Figure(figsize=(2 * WIDTH, 1.7 * HEIGHT), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", xlabel="nodes of the tree", ylabel="time for each sample [µs]")
     axes.grid(color="#dddddd", linewidth=0.6)
     for (problem, planners), colour in zip(runs.items(), cycle(COLOURS), strict=False):
-        told = [group for group in planners.values() if all(run.samples and run.nodes for run in group)]
-        if told:
-            _draw_costs(axes, problem, *np.array(sorted(map(sample_cost, told))).T, colour)
+        counted = [group for group in planners.values() if all(run.samples and run.nodes for run in group)]
+        if counted:
+            nodes, costs = np.array(sorted(map(sample_cost, counted))).T
+            _draw_costs(axes, problem, nodes, costs, colour)
     if not axes.lines:
-        raise UsageError("--plot-samples: no run tells its samples and vertices; give files that `dubins_rrt bench --out` wrote")
+        raise UsageError("--plot-samples: no run says its samples and vertices; give files that `dubins_rrt bench --out` wrote")
     axes.plot([], [], "--", color="#777777", label="logarithm of the tree")
     axes.set_ylim(0)
     axes.legend(frameon=False)
     figure.savefig(file, dpi=DPI)
 
 
-def sample_cost(group: list[Run]) -> tuple[float, float]:
-    """The medians of the nodes of a planner's runs, and of their times for each sample [µs]."""
+def sample_cost(group: list[RunRecord]) -> tuple[float, float]:
+    """Return the medians of the number of nodes of a planner's runs, and of their times per sample [µs]."""
     return quantile([run.nodes for run in group], 0.5), quantile([1e6 * run.total / run.samples for run in group], 0.5)
 
 
@@ -81,7 +85,7 @@ def _columns(panels: Collection[str]) -> int:
 
 
 def _panels(problems: list[str], times: np.ndarray, planners: int) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with an empty panel for each problem, and room for the legend."""
+    """Make a figure with an empty panel for each problem, and room for the legend."""
     columns = _columns(problems)
     rows = math.ceil(len(problems) / columns)
     height = HEIGHT * rows + ROW * math.ceil(planners / columns)
@@ -92,8 +96,8 @@ def _panels(problems: list[str], times: np.ndarray, planners: int) -> tuple[Figu
     panels = dict(zip(problems, grid, strict=False))
     for problem, axes in panels.items():
         axes.set(xscale="log", yscale="log")
-        axes.set_xticks(list(TIMES), TIMES.values())
-        axes.set_yticks(list(COSTS), COSTS.values())
+        axes.set_xticks(list(TIMES), list(TIMES.values()))
+        axes.set_yticks(list(COSTS), list(COSTS.values()))
         axes.set(xlim=(times[0], times[-1]), ylim=(0.85 * LEAST, MOST))  # the ticks beyond would widen them
         axes.set_title(problem, fontsize=12, weight="bold", loc="left")
         axes.tick_params(labelsize=10, which="both", labelbottom=True)
@@ -103,8 +107,9 @@ def _panels(problems: list[str], times: np.ndarray, planners: int) -> tuple[Figu
     return figure, panels
 
 
-def _draw(axes: Axes, times: np.ndarray, group: list[Run], best: Best, colour: str, line: str) -> None:
-    """The median of a planner's runs over time and the band between their quartiles, each from when on it is finite."""
+def _draw(axes: Axes, times: np.ndarray, group: list[RunRecord], best: Best, colour: str,
+          line: Literal["-", "--", ":"]) -> None:
+    """Draw the median of a planner's runs over time and the band between their quartiles, where they are finite."""
     above = np.array([[ratio(run.cost_at(time), best) - 1 for run in group] for time in times])
     low, middle, high = (np.array([max(quantile(costs, share), LEAST) for costs in above]) for share in (0.25, 0.5, 0.75))
     axes.fill_between(times, low, high, where=np.isfinite(high), step="post", color=colour, alpha=0.2, linewidth=0)

@@ -1,6 +1,5 @@
-"""The problems that `dubins_rrt bench` measures on, from its file."""
+"""The problems of `dubins_rrt bench`, read from its file and checked before the first run."""
 
-import json
 import os
 from collections import Counter
 from collections.abc import Collection
@@ -10,17 +9,18 @@ from typing import Any, NamedTuple
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Vehicle, checked_pose
 from dubins_rrt_ros.planning.text import one_line, quoted
 
+from ..common.documents import read_json
 from ..common.parser import UsageError
 
 KEYS = ("name", "map", "start", "goal", "turning_radius", "robot_radius")
 
 
 class Case(NamedTuple):
-    """A problem whose map is still a file.
+    """A problem whose map is not loaded yet.
 
     Attributes:
-        name: no other case of the file has it.
-        map: the map's file.
+        name: a name that no other case of the file has.
+        map: the file of the map.
         vehicle: turning radius and size.
         start, goal: (x [m], y [m], theta [rad]).
     """
@@ -33,10 +33,10 @@ class Case(NamedTuple):
 
 
 def read_cases(file: str) -> list[Case]:
-    """The problems of a file; keys that are not known are ignored.
+    """Read the problems of a file; unknown keys are ignored.
 
     Raises:
-        UsageError: the file or one of its problems is not what it must be, or a map is not there.
+        UsageError: the file or one of its problems is malformed, or a map is missing.
     """
     entries = read_json(file)
     if not (isinstance(entries, list) and entries):
@@ -48,37 +48,11 @@ def read_cases(file: str) -> list[Case]:
     return cases
 
 
-def read_json(file: str) -> Any:
-    """What a JSON file holds.
-
-    Raises:
-        UsageError: it cannot be read, or is no JSON.
-    """
-    try:
-        return json.loads(read_text(file))
-    except (ValueError, RecursionError) as error:
-        raise UsageError(f"{file} is no JSON file: {error}") from error
-
-
-def read_text(file: str) -> str:
-    """The text of a file.
-
-    Raises:
-        UsageError: it cannot be read, or is no text.
-    """
-    try:
-        return Path(file).read_text(encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{file} is no text file: {error}") from error
-
-
 def chosen(cases: list[Case], names: Collection[str]) -> list[Case]:
-    """The cases of these names, in the file's order.
+    """Select the cases of these names, in the order of the file.
 
     Raises:
-        UsageError: there is none of a name.
+        UsageError: a name is unknown.
     """
     unknown = [name for name in names if name not in {case.name for case in cases}]
     if unknown:
@@ -95,18 +69,18 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
     for key in ("name", "map"):
         if not (isinstance(entry[key], str) and entry[key]):
             raise UsageError(f"{where}: its {key} is {quoted(entry[key])}; give a text")
-    where, map = f"{where}, {entry['name']}", folder / entry["map"]
-    if not os.path.isfile(map):  # pathlib's is_file() raises for a name that is too long
-        raise UsageError(one_line(f"{where}: there is no map file {map}"))
+    where, map_file = f"{where}, {entry['name']}", folder / entry["map"]
+    if not os.path.isfile(map_file):  # pathlib's is_file() raises for a name that is too long
+        raise UsageError(one_line(f"{where}: there is no map file {map_file}"))
     try:
         vehicle = Vehicle(turning_radius=entry["turning_radius"], robot_radius=entry["robot_radius"])
-        return Case(entry["name"], map, vehicle, *(_pose(key, entry[key]) for key in ("start", "goal")))
+        return Case(entry["name"], map_file, vehicle, _pose("start", entry["start"]), _pose("goal", entry["goal"]))
     except (OptionError, InvalidPose) as error:
         raise UsageError(one_line(f"{where}: {error}")) from error
 
 
 def _pose(name: str, numbers: Any) -> Pose:
-    """A pose of numbers, not of texts that could be read as such."""
+    """Check a pose; numbers written as text are refused."""
     if not (isinstance(numbers, list) and all(type(number) in (int, float) for number in numbers)):
         raise InvalidPose(f"The {name} pose is {quoted(numbers)}; give three numbers: [x [m], y [m], yaw [rad]].")
     return checked_pose(name, numbers)

@@ -1,4 +1,4 @@
-"""The lines of JSON that `dubins_rrt bench` writes, read again, and the shortest lengths known of their problems."""
+"""The records of `dubins_rrt bench`: runs read from lines of JSON, and the shortest known lengths of their problems."""
 
 import json
 import math
@@ -6,20 +6,20 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from ..common.documents import read_json, read_text
 from ..common.parser import UsageError
-from .problems import read_json, read_text
 
 
-class Run(NamedTuple):
-    """One run.
+class RunRecord(NamedTuple):
+    """The record of one run.
 
     Attributes:
-        problem, planner, seed: what was run.
-        solved: whether it has a path that passed its check.
-        trace: (seconds, cost [m]) of each improvement, the costs falling with time; none of a run that is not solved.
-        end: until when it is known what the run has [s]: it was cut short then, if it did not end by itself.
-        total: how long it took, at most the time it was given [s].
-        samples, nodes: how many samples were drawn, and how many nodes the tree has; 0 where the line does not tell.
+        problem, planner, seed: the problem, the planner and its seed.
+        solved: True if it has a path that passed its check.
+        trace: (time [s], cost [m]) of each improvement, with falling costs; empty for a run that is not solved.
+        end: time until which the result is known [s]: its limit, or its end if that was later.
+        total: duration, at most the time limit [s].
+        samples, nodes: number of samples drawn, and of nodes of the tree; 0 where the line does not say.
     """
 
     problem: str
@@ -34,43 +34,43 @@ class Run(NamedTuple):
 
     @property
     def first(self) -> tuple[float, float]:
-        """When its first path came [s], and its cost [m]."""
+        """Time [s] and cost [m] of the first path."""
         return self.trace[0] if self.trace else (math.inf, math.inf)
 
     @property
     def cost(self) -> float:
-        """Of its best path [m]."""
+        """Cost of the best path [m]."""
         return self.trace[-1][1] if self.trace else math.inf
 
     def cost_at(self, time: float) -> float:
-        """Of the best path by then [m]."""
+        """Return the cost of the best path at a time [m]."""
         done = bisect_right(self.trace, (time, math.inf))
         return self.trace[done - 1][1] if done and time <= self.end else math.inf
 
     def time_to(self, cost: float) -> float:
-        """Until its path cost no more than that [s]."""
+        """Return the time at which a path first cost no more than that [s]."""
         return next((at for at, reached in self.trace if reached <= cost), math.inf)
 
 
 class Best(NamedTuple):
-    """The shortest length known of a problem [m], and where it comes from."""
+    """The shortest known length of a problem [m], and its source."""
 
     cost: float
     source: str
 
 
 #: The runs by problem, then by planner.
-Runs = Mapping[str, Mapping[str, list[Run]]]
+Runs = Mapping[str, Mapping[str, list[RunRecord]]]
 
 
-def run_of(line: Mapping[str, Any]) -> Run:
-    """The run that a line of `dubins_rrt bench` tells of, or of a program that writes the same.
+def parse_record(line: Mapping[str, Any]) -> RunRecord:
+    """Parse a line of `dubins_rrt bench`, or of a program that writes the same fields.
 
-    Its check is the field `audit`, which is "ok", or `verify.step_ok`; without either `solved` is believed. `samples` and
-    `vertices` need not be there.
+    The path passed its check if the field `audit` is "ok", or `verify.step_ok` is true; without either `solved` is believed.
+    `samples` and `vertices` are optional.
 
     Raises:
-        KeyError, TypeError, ValueError, AttributeError: the line has not the fields it must have.
+        KeyError, TypeError, ValueError, AttributeError: a field is missing or wrong.
     """
     if not isinstance(line, Mapping):
         raise TypeError("it is no object")
@@ -82,13 +82,15 @@ def run_of(line: Mapping[str, Any]) -> Run:
     trace = _improvements(line["trace"]) if solved else ()
     if solved and not trace:
         raise ValueError("it is solved, but its trace is empty")
-    return Run(str(line["problem"]), str(line["planner"]), int(line["seed"]), solved, trace, max(limit, total), min(limit, total),
-               int(line.get("samples") or 0), int(line.get("vertices") or 0))
+    return RunRecord(
+        problem=str(line["problem"]), planner=str(line["planner"]), seed=int(line["seed"]), solved=solved, trace=trace,
+        end=max(limit, total), total=min(limit, total), samples=int(line.get("samples") or 0),
+        nodes=int(line.get("vertices") or 0))
 
 
 def _improvements(trace: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """The entries of a trace that improve on all before."""
-    improvements = []
+    """Return the entries of a trace that improve on all before."""
+    improvements: list[tuple[float, float]] = []
     for time, cost in sorted((float(time), float(cost)) for time, cost in trace):
         if not (0 <= time < math.inf and 0 <= cost < math.inf):
             raise ValueError(f"its trace holds [{time:g}, {cost:g}]")
@@ -97,21 +99,22 @@ def _improvements(trace: Iterable[tuple[float, float]]) -> tuple[tuple[float, fl
     return tuple(improvements)
 
 
-def grouped(runs: Iterable[Run]) -> Runs:
-    """The runs by problem and planner, both in the order in which they came."""
-    groups = {}
+def grouped(runs: Iterable[RunRecord]) -> Runs:
+    """Group runs by problem and planner, both in the order of their first run."""
+    groups: dict[str, dict[str, list[RunRecord]]] = {}
     for run in runs:
         groups.setdefault(run.problem, {}).setdefault(run.planner, []).append(run)
     return groups
 
 
 def read_runs(files: Iterable[str]) -> Runs:
-    """The runs in files of JSON lines.
+    """Read the runs in files of JSON lines.
 
     Raises:
-        UsageError: a file cannot be read, a line is none of a run, a run is there twice, or there is none.
+        UsageError: a file cannot be read, a line is no run, a run occurs twice, or there is none.
     """
-    runs, places = [], {}
+    runs: list[RunRecord] = []
+    places: dict[tuple[str, str, int], str] = {}
     for file in files:
         for number, text in enumerate(read_text(file).split("\n"), 1):
             if not text.strip():
@@ -128,24 +131,24 @@ def read_runs(files: Iterable[str]) -> Runs:
     return grouped(runs)
 
 
-def _read_run(text: str, place: str) -> Run:
+def _read_run(text: str, place: str) -> RunRecord:
     try:
-        return run_of(json.loads(text))
+        return parse_record(json.loads(text))
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        reason = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise UsageError(f"{place} is no run, for {reason}; give files that `dubins_rrt bench --out` wrote, and drop lines that "
                          "were cut short") from error
 
 
 def read_best_known(file: str) -> dict[str, float]:
-    """The lengths in a file {problem: m} or {problem: {"cost": m}} [m].
+    """Read the lengths in a file {problem: m} or {problem: {"cost": m}} [m].
 
     Raises:
         UsageError: it is no such file.
     """
     document = read_json(file)
     entries = document.items() if isinstance(document, dict) else [("", document)]
-    costs = {name: entry.get("cost") if isinstance(entry, dict) else entry for name, entry in entries}
+    costs: dict[str, Any] = {name: entry.get("cost") if isinstance(entry, dict) else entry for name, entry in entries}
     wrong = [name for name, cost in costs.items() if type(cost) not in (int, float) or not 0 < cost < math.inf]
     if wrong:
         raise UsageError(f"{file}: what it has for {wrong[0] or 'the problems'} is no length; give {{problem: metres, ...}}")
@@ -153,11 +156,11 @@ def read_best_known(file: str) -> dict[str, float]:
 
 
 def best_known(runs: Runs, given: Mapping[str, float]) -> dict[str, Best]:
-    """The shortest known length of each problem: the given one, or that of a run where it is shorter or none is given."""
+    """Return the shortest known length of each problem: the given one, or that of a run if it is shorter or none is given."""
     return {problem: _best(planners, given.get(problem)) for problem, planners in runs.items()}
 
 
-def _best(planners: Mapping[str, list[Run]], given: float | None) -> Best:
+def _best(planners: Mapping[str, list[RunRecord]], given: float | None) -> Best:
     run = min((run for group in planners.values() for run in group), key=lambda run: run.cost)
     if given is not None and given <= run.cost:
         return Best(given, "as given")

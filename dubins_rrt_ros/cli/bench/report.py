@@ -1,17 +1,17 @@
-"""What runs of planners amount to: statistics, and the report in Markdown.
+"""The report of `dubins_rrt bench`: statistics of runs, as Markdown and as JSON.
 
-A median is the lower one and a quartile its like: the least value that at least this share of the runs does not exceed, so that
-each is a value that was measured. Runs without a path that passed its check count, as infinite.
+Medians and quartiles are the smallest value that at least this share of the runs does not exceed: each is a measured value.
+Runs without a path that passed its check count as infinite.
 """
 
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from .records import Best, Run, Runs
+from .records import Best, RunRecord, Runs
 
-#: When costs are looked at [s], and above the best known by which shares.
-MARKS, SHARES = (0.05, 0.1, 0.3, 1.0, 5.0), (0.05, 0.02, 0.01)
+#: Times at which costs are compared [s], and excesses over the best known cost whose times are.
+MARKS, EXCESSES = (0.05, 0.1, 0.3, 1.0, 5.0), (0.05, 0.02, 0.01)
 
 EXPLANATION = """\
 Lengths are in metres; times count from the request on, with the map prepared. Each figure is the lower median over all runs of a
@@ -21,38 +21,38 @@ as infinite. A dash is an infinite figure, or one at a mark that the runs were c
 
 
 def quantile(values: Iterable[float], share: float) -> float:
-    """The least value that at least this share of the values does not exceed."""
+    """Return the smallest value that at least this share of the values does not exceed."""
     ordered = sorted(values)
     return ordered[max(math.ceil(share * len(ordered)) - 1, 0)]
 
 
 def quartiles(values: Iterable[float]) -> dict[str, float]:
-    """The three values that split them into quarters, by name."""
+    """Return the median and the quartiles by name."""
     ordered = sorted(values)
     names = {"lower_quartile": 0.25, "median": 0.5, "upper_quartile": 0.75}
     return {name: quantile(ordered, share) for name, share in names.items()}
 
 
 def median(values: Iterable[float]) -> float:
-    """The lower median."""
+    """Return the lower median."""
     return quantile(values, 0.5)
 
 
 def marks_of(runs: Runs) -> list[float]:
-    """The marks within the time of the longest run [s]; the first in any case."""
+    """Return the marks within the time of the longest run [s], and the first in any case."""
     longest = max(run.total for planners in runs.values() for group in planners.values() for run in group)
     return [mark for mark in MARKS if mark <= max(longest, MARKS[0])]
 
 
 def ratio(cost: float, best: Best) -> float:
-    """A cost by the best known one; infinite where there is none of either."""
+    """Divide a cost by the best known one; infinite without a path."""
     if math.isinf(cost):
         return math.inf
     return cost / best.cost if best.cost > 0 else 1.0  # a start that is the goal: all lengths are 0
 
 
 def summary(runs: Runs) -> str:
-    """A line for each problem: how many runs are solved, and the medians."""
+    """Write a line for each problem: number of solved runs, and medians."""
     return "\n".join(f"{problem}: {sum(run.solved for run in group)}/{len(group)} solved, "
                      f"first path {milliseconds(median(run.first[0] for run in group))} ms, "
                      f"{metres(median(run.cost for run in group))} m"
@@ -60,7 +60,7 @@ def summary(runs: Runs) -> str:
 
 
 def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
-    """The report: all problems in one table, then a table for each."""
+    """Write the report in Markdown: all problems in one table, then a table for each."""
     marks = marks_of(runs)
     parts = ["# Planners compared", EXPLANATION.strip(), "## All problems", _overview(runs, best, marks)]
     for problem, planners in runs.items():
@@ -70,7 +70,7 @@ def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
 
 
 def to_document(runs: Runs, best: Mapping[str, Best]) -> dict[str, Any]:
-    """What the report computes as what JSON can hold, but for what is infinite; times in seconds, lengths in metres."""
+    """Return the figures of the report for JSON, infinite ones included; times in seconds, lengths in metres."""
     marks = marks_of(runs)
     names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
     results = [{"problem": problem, "planner": planner, "best_known": best[problem].cost, **_figures(group, best[problem], marks)}
@@ -78,17 +78,17 @@ def to_document(runs: Runs, best: Mapping[str, Best]) -> dict[str, Any]:
     return {"planners": [{"planner": name} | _overall(name, runs, best, marks) for name in names], "results": results}
 
 
-def _figures(group: list[Run], best: Best, marks: list[float]) -> dict[str, Any]:
-    """Of a planner's runs of a problem."""
+def _figures(group: list[RunRecord], best: Best, marks: list[float]) -> dict[str, Any]:
+    """Return the figures of a planner's runs on a problem."""
     return {"runs": len(group), "solved": sum(run.solved for run in group),
             "time_to_first": quartiles(run.first[0] for run in group), "first_cost": quartiles(run.first[1] for run in group),
             "final_cost": quartiles(run.cost for run in group),
             "cost_at": {f"{mark:g}": quartiles(run.cost_at(mark) for run in group) for mark in marks},
-            "time_to_within": {f"{share:g}": median(run.time_to((1 + share) * best.cost) for run in group) for share in SHARES}}
+            "time_to_within": {f"{share:g}": median(run.time_to((1 + share) * best.cost) for run in group) for share in EXCESSES}}
 
 
 def _overall(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> dict[str, Any]:
-    """Of a planner's runs of all problems: means of medians, each with how many of the problems have one."""
+    """Return the figures of a planner's runs on all problems: means of medians, and the number of problems in each."""
     groups = {problem: planners[planner] for problem, planners in runs.items() if planner in planners}
     everything = [run for group in groups.values() for run in group]
     ratios = {mark: [ratio(median(run.cost_at(mark) for run in group), best[problem]) for problem, group in groups.items()]
@@ -100,7 +100,7 @@ def _overall(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[flo
 
 
 def _mean(values: Iterable[float]) -> dict[str, float]:
-    """The geometric mean of those that are finite, and how many they are."""
+    """Return the geometric mean of the finite values, and their number."""
     finite = [value for value in values if math.isfinite(value)]
     mean = math.prod(value ** (1 / len(finite)) for value in finite) if finite else math.inf
     return {"geometric_mean": mean, "problems": len(finite)}
@@ -122,16 +122,16 @@ def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: lis
 
 
 def _shown(mean: Mapping[str, float], problems: int, show: Callable[[float], str]) -> str:
-    """A mean, and of how many values it is, unless it is of one for each problem."""
+    """Write a mean, with the number of its values unless there is one for each problem."""
     if not mean["problems"]:
         return "-"
     text = show(mean["geometric_mean"])
     return text if mean["problems"] == problems else f"{text} ({mean['problems']}/{problems})"
 
 
-def _problem_table(planners: Mapping[str, list[Run]], best: Best, marks: list[float]) -> str:
+def _problem_table(planners: Mapping[str, list[RunRecord]], best: Best, marks: list[float]) -> str:
     head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks),
-            *(f"{100 * share:g} % above best [ms]" for share in SHARES)]
+            *(f"{100 * share:g} % above best [ms]" for share in EXCESSES)]
     return table(head, [_problem_row(planner, _figures(group, best, marks)) for planner, group in planners.items()])
 
 
@@ -143,7 +143,7 @@ def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
 
 
 def spread(values: list[float], show: Callable[[float], str]) -> str:
-    """Median and quartiles."""
+    """Write the median with the quartiles in brackets."""
     return _spread(quartiles(values), show)
 
 
@@ -157,19 +157,19 @@ def _share(figures: Mapping[str, Any]) -> str:
 
 
 def metres(value: float, digits: int = 2) -> str:
-    """Digits after the point, or a dash."""
+    """Write metres with this many decimals, or a dash."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
 def milliseconds(seconds: float) -> str:
-    """Milliseconds with three digits, or all where there are more."""
+    """Write a time in milliseconds with three significant digits, from a second on with all."""
     if math.isinf(seconds):
         return "-"
     return f"{1000 * seconds:.3g}" if seconds < 0.9995 else f"{1000 * seconds:.0f}"
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """A table in Markdown."""
+    """Write a table in Markdown."""
     lines = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
     lines.insert(1, ["---"] * len(head))
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

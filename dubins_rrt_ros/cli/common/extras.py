@@ -6,7 +6,7 @@ from .parser import UsageError
 
 
 def require_matplotlib(extra: str = "plots") -> None:
-    """Refuse to draw where there is nothing to draw with; to be called before the work, so that none is lost for it.
+    """Refuse to draw without matplotlib. Called before the work, so that none is lost.
 
     Raises:
         UsageError: matplotlib is not installed; the message names the extra that installs it.

@@ -11,13 +11,18 @@ def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type) -> 
     """Give `parser` a flag for every option of the dataclass `cls`, such as --turning-radius for turning_radius."""
     group = parser.add_argument_group(title)
     for item in options(cls):
-        default = str(item.default).lower() if item.type is bool else item.default if item.default != "" else "empty"
-        help = f"{item.describe()}; default {default}".replace("%", "%%")
-        group.add_argument("--" + item.name.replace("_", "-"), default=argparse.SUPPRESS, help=help, **_kind(item))
+        text = f"{item.describe()}; default {_shown_default(item)}".replace("%", "%%")
+        group.add_argument("--" + item.name.replace("_", "-"), default=argparse.SUPPRESS, help=text, **_keywords(item))
 
 
-def _kind(item: Option) -> dict[str, Any]:
-    """What argparse wants to know of an option's type."""
+def _shown_default(item: Option) -> str:
+    if item.type is bool:
+        return str(item.default).lower()
+    return str(item.default) or "empty"
+
+
+def _keywords(item: Option) -> dict[str, Any]:
+    """Return the keyword arguments with which argparse reads an option's type."""
     if item.type is bool:
         return {"action": argparse.BooleanOptionalAction}
     if item.choices:
@@ -26,5 +31,10 @@ def _kind(item: Option) -> dict[str, Any]:
 
 
 def given_options(arguments: argparse.Namespace, cls: type) -> dict[str, Any]:
-    """The options of `cls` that were given on the command line, by name."""
+    """Return the options of `cls` that were given on the command line, by name."""
     return {item.name: getattr(arguments, item.name) for item in options(cls) if item.name in arguments}
+
+
+def largest(cls: type, name: str) -> Any:
+    """Return the largest value that an option of the dataclass `cls` takes."""
+    return {item.name: item.high for item in options(cls)}[name]

@@ -1,4 +1,4 @@
-"""The files that the command line writes: JSON and CSV here, pictures in plots.py."""
+"""The files that commands write: JSON and CSV here, pictures in plots.py. All are checked before the work begins."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ DRAWINGS = (".png", ".svg", ".pdf")
 
 
 def check_folder(*files: str | None) -> None:
-    """Refuse a file in a folder that does not exist; to be called before planning, so that no plan is lost for it.
+    """Refuse a file in a folder that does not exist. Called before planning, so that no plan is lost.
 
     Raises:
         UsageError: one of the files has no folder, or is one.
@@ -31,10 +31,10 @@ def check_folder(*files: str | None) -> None:
 
 
 def check_drawing(file: str | None) -> None:
-    """Refuse a picture that cannot be drawn; to be called before planning, so that no plan is lost for it.
+    """Refuse a picture that cannot be drawn. Called before planning, so that no plan is lost.
 
     Raises:
-        UsageError: the name ends with no format that is drawn, or there is nothing to draw with.
+        UsageError: the name does not end with a known format, or matplotlib is not installed.
     """
     if not file:
         return
@@ -44,12 +44,12 @@ def check_drawing(file: str | None) -> None:
 
 
 def words_for(json_file: str | None) -> TextIO:
-    """Where the words for people go: to standard error where standard output is to hold the JSON alone."""
+    """Return the stream for people: standard error where standard output holds the JSON, standard output elsewhere."""
     return sys.stderr if json_file == STDOUT else sys.stdout
 
 
 def finite(document: Any) -> Any:
-    """A document with null in place of what JSON has no numbers for, such as the length of a path that is not there."""
+    """Return a document with null in place of infinite numbers and NaN, which JSON has not."""
     if isinstance(document, dict):
         return {name: finite(value) for name, value in document.items()}
     if isinstance(document, list | tuple):

@@ -2,6 +2,7 @@
 
 import argparse
 import difflib
+import sys
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
 from typing import Any, NoReturn
@@ -12,14 +13,14 @@ class UsageError(Exception):
 
 
 def near_miss(word: str, known: Iterable[str]) -> str:
-    """The end of a sentence on a word that is not known: what it begins or may be a slip of, if anything."""
+    """Return the end of a sentence on an unknown word: a known one that it begins or nearly is, if there is any."""
     known = list(known)
     near = [name for name in known if name.startswith(word)] or difflib.get_close_matches(word, known)
     return f"; did you mean {near[0]}?" if near else ""
 
 
 class _Formatter(argparse.HelpFormatter):
-    """Fills paragraphs, but leaves those alone that have indented lines: examples are printed as they are run."""
+    """A formatter that fills paragraphs but those with indented lines: examples are printed as they are run."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         fill = super()._fill_text
@@ -27,7 +28,7 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors take one line and suggest what was meant; it knows flags by their full names only."""
+    """An argument parser whose errors take one line and suggest what was meant. Flags cannot be abbreviated."""
 
     def __init__(self, **keywords: Any):
         super().__init__(allow_abbrev=False, formatter_class=_Formatter, **keywords)
@@ -36,17 +37,17 @@ class Parser(argparse.ArgumentParser):
         """End the process with status 2."""
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
-    def parse_known_args(self, args: Sequence[str], namespace: argparse.Namespace | None = None
-                         ) -> tuple[argparse.Namespace, list[str]]:
-        """As ever, but nothing is left over: a flag that is not known is named before those that are missing for it."""
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Parse as argparse does, but leave nothing over, and name an unknown flag before those that are missing for it."""
+        args = sys.argv[1:] if args is None else args
         own = takewhile(_is_flag, args) if self._subparsers else filter(_is_flag, args)  # after a command come its flags
         for flag in (word.split("=")[0] for word in own):
             if flag not in self._option_string_actions:
                 self.error(f"there is no flag {flag}{near_miss(flag, self._option_string_actions)}")
-        namespace, extras = super().parse_known_args(args, namespace)
+        parsed, extras = super().parse_known_args(args, namespace)
         if extras:
             self.error(f"{extras[0].strip()} is one argument too many")
-        return namespace, extras
+        return parsed, extras
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
@@ -60,27 +61,27 @@ def _is_flag(word: str) -> bool:
 
 def describe(parser: argparse.ArgumentParser, *, usage: str, description: str, examples: Sequence[str], exit_status: str,
              notes: str = "") -> None:
-    """Give a command its help, which ends with notes, examples that run as they are printed, and the exit status."""
+    """Give a command its help: description, notes, examples that run as they are printed, and the exit status."""
     parser.usage = f"%(prog)s {usage}"
     parser.description = description
     parser.epilog = f"{notes}\n\n{section('examples', *examples)}\n\n{section('exit status', exit_status)}"
 
 
 def section(title: str, *lines: str) -> str:
-    """A part of a help text whose lines stay as they are."""
+    """Return a section of a help text whose lines are printed as they are."""
     return "\n".join([f"{title}:", *(f"  {line}" for line in lines)])
 
 
 def add_json_flag(parser: argparse.ArgumentParser, what: str) -> None:
-    """Give `parser` the flag --json; where it is not given its value is None."""
+    """Give `parser` the flag --json, whose default is None."""
     parser.add_argument("--json", metavar="FILE", default=None,
                         help=f"write {what} as JSON; - is standard output, where nothing else goes then")
 
 
-def guard_numbers(argv: list[str]) -> list[str]:
-    """`argv` with a blank in front of every negative number, so that argparse takes none for a flag.
+def guard_numbers(argv: Sequence[str]) -> list[str]:
+    """Return `argv` with a blank in front of every negative number, so that argparse takes none for a flag.
 
-    It knows -1 and -0.5 as numbers by itself, but not -1e-3 nor -inf. The blank is lost again in float().
+    By itself it knows -1 and -0.5 as numbers, but neither -1e-3 nor -inf. float() ignores the blank.
     """
     return [" " + word if word.startswith("-") and _is_number(word) else word for word in argv]
 

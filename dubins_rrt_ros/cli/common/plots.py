@@ -1,4 +1,4 @@
-"""Pictures of a plan: map, tree and path, to scale."""
+"""Pictures of a plan: map, tree and path, to scale. It needs matplotlib, so commands import it only when they draw."""
 
 import math
 import textwrap
@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Polygon
-from matplotlib.path import Path as Outline
+from matplotlib.path import Path as Contour
 from matplotlib.transforms import Affine2D
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Vehicle
@@ -23,24 +23,24 @@ from dubins_rrt_ros.planning.maps.model import OCCUPIED_FROM
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
 TREE, PATH, START, GOAL, CULPRIT = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
 DPI = 160
-#: The longer side of the map in the picture, what the labels around it need, and the least width, for the title [inch].
+#: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
-#: The height of a line below the title [inch], and how many of its letters go into an inch.
+#: Height of a line below the title [inch], and number of its letters to the inch.
 LINE, LETTERS = 0.19, 13.5
-#: By how much the edge of what a disc sweeps may be off, in its radii.
+#: Maximum error of the edge of the area that a disc sweeps, in its radii.
 FLAT = 0.01
 
 
 class Drawing(NamedTuple):
-    """What a picture shows.
+    """The contents of a picture.
 
     Attributes:
         map: free and occupied space.
         start, goal: (x [m], y [m], theta [rad]).
-        vehicle: what drives.
+        vehicle: the vehicle, drawn at the start, at the goal and along the path.
         tree: (m, 2, 2) line segments of the tree's edges [m].
-        path: (n, 3) poses of the path, close together, none where there is no path.
-        title: one sentence with what matters most.
+        path: (n, 3) poses of the path, close together; none where there is no path.
+        title: the most important figures, in one sentence.
         subtitle: the other figures.
         culprit: (x, y) of what keeps a path from being there [m], or None.
     """
@@ -57,7 +57,7 @@ class Drawing(NamedTuple):
 
 
 def draw_plan(file: str, plan: Plan) -> None:
-    """Draw a plan into a file of the format of its name's ending."""
+    """Draw a plan to a file, whose ending selects the format."""
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
     path = plan.path.poses(plan.settings.path_spacing) if plan.path else np.empty((0, 3))
     title, subtitle = _captions(plan)
@@ -67,24 +67,24 @@ def draw_plan(file: str, plan: Plan) -> None:
 
 def _captions(plan: Plan) -> tuple[str, str]:
     name = planner_title(plan.settings.planner)
-    if plan.path is None:
+    if plan.length is None or plan.gap is None or plan.time_to_first is None:
         return f"{name}: no path, {plan.status.name}", plan.message
     return (path_title(plan.settings.planner, plan.length, plan.gap),
             figures_title(plan.samples, plan.time_to_first, plan.planning_time))
 
 
 def planner_title(planner: str) -> str:
-    """The literature's name of a planner."""
+    """Return the literature's name of a planner."""
     return {"rrt": "RRT", "rrt_star": "RRT*"}[planner]
 
 
 def path_title(planner: str, length: float, gap: float) -> str:
-    """The title over a path."""
+    """Return the title of a picture of a path."""
     return f"{planner_title(planner)}: {length:.2f} m, at most {100 * gap:.1f} % above the shortest"
 
 
 def figures_title(samples: int, time_to_first: float, planning_time: float) -> str:
-    """The figures below the title."""
+    """Return the line of figures below the title."""
     return f"{samples} samples, first path after {_duration(time_to_first)}, planned in {_duration(planning_time)}"
 
 
@@ -93,7 +93,7 @@ def _duration(seconds: float) -> str:
 
 
 def draw(file: str, drawing: Drawing) -> None:
-    """Draw into a file of the format of its name's ending."""
+    """Draw to a file, whose ending selects the format."""
     figure, axes = _canvas(drawing)
     draw_on(axes, drawing)
     figure.savefig(file, dpi=DPI)
@@ -103,52 +103,52 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     """Draw all but the titles on axes that `frame` has fitted to the map."""
     draw_map(axes, drawing.map)
     # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
-    axes.add_collection(LineCollection(drawing.tree, colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
+    axes.add_collection(LineCollection(list(drawing.tree), colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
     _draw_path(axes, drawing)
     draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
     if drawing.culprit is not None:
         axes.plot(*drawing.culprit, "x", color=CULPRIT, markersize=12, markeredgewidth=3, zorder=6)
 
 
-def frame(axes: Axes, map: Map) -> None:
+def frame(axes: Axes, world_map: Map) -> None:
     """Fit axes to a map, with equal scales and a rim of the obstacle around it."""
-    low, high = _view(map)
+    low, high = _view(world_map)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal", facecolor=OBSTACLE)
     axes.ticklabel_format(useOffset=False, style="plain")
 
 
 def draw_poses(axes: Axes, start: Sequence[float], goal: Sequence[float], vehicle: Vehicle) -> None:
     """Draw the vehicle at the start and at the goal, with arrows and names, on axes that `frame` has fitted to the map."""
-    reach = vehicle.robot_radius
+    size = vehicle.robot_radius
     arrow = max(2.2 * vehicle.inscribed_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
     _draw_pose(axes, start, START, vehicle, arrow)
     _draw_pose(axes, goal, GOAL, vehicle, arrow)
     # Behind the start and ahead of the goal, where no path runs.
-    beside = max(1.3 * vehicle.inscribed_radius, 0.3 * arrow)
-    _draw_name(axes, "start", start, START, -max(1.1 * reach, beside), beside)
-    _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * reach), max(1.1 * arrow, beside))
+    sideways = max(1.3 * vehicle.inscribed_radius, 0.3 * arrow)
+    _draw_name(axes, "start", start, START, -max(1.1 * size, sideways), sideways)
+    _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * size), max(1.1 * arrow, sideways))
 
 
 def decorate(axes: Axes) -> None:
-    """Give axes of curves the size of their letters, and their grid."""
+    """Give axes of curves their font sizes and their grid."""
     axes.tick_params(labelsize=12)
-    axes.xaxis.label.set_size(13)
-    axes.yaxis.label.set_size(13)
+    axes.xaxis.label.set_fontsize(13)
+    axes.yaxis.label.set_fontsize(13)
     axes.grid(color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _view(map: Map) -> tuple[np.ndarray, np.ndarray]:
-    """The corners of what is shown: the map and a rim of the obstacle around it."""
-    corners = map.corners()
+def _view(world_map: Map) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the view: the map and a rim of the obstacle around it."""
+    corners = world_map.corners()
     low, high = corners.min(axis=0), corners.max(axis=0)
     rim = 0.01 * (high - low).max()
     return low - rim, high + rim
 
 
 def _canvas(drawing: Drawing) -> tuple[Figure, Axes]:
-    """A figure cut to the shape of the view, so that equal axes leave no blank, and its title."""
+    """Make a figure, with its title, in the shape of the view, so that equal axes leave no blank."""
     low, high = _view(drawing.map)
     width, height = MAP_SIDE * (high - low) / (high - low).max()
     across = max(width + LEFT + RIGHT, WIDTH)
@@ -163,12 +163,12 @@ def _canvas(drawing: Drawing) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def draw_map(axes: Axes, map: Map, free: str = FREE) -> None:
-    """Draw what is free, in a colour, and what is unknown on axes that `frame` has fitted to the map."""
-    if isinstance(map, GridMap):
-        _draw_grid(axes, map, free)
+def draw_map(axes: Axes, world_map: Map, free: str = FREE) -> None:
+    """Draw free space, in a colour, and unknown space on axes that `frame` has fitted to the map."""
+    if isinstance(world_map, GridMap):
+        _draw_grid(axes, world_map, free)
     else:
-        axes.add_patch(PathPatch(_outline(map.free), facecolor=free, edgecolor="none", zorder=1))
+        axes.add_patch(PathPatch(_contour(world_map.free), facecolor=free, edgecolor="none", zorder=1))
 
 
 def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
@@ -181,38 +181,38 @@ def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
     axes.axis(view)
 
 
-def _outline(polygons: shapely.Geometry) -> Outline:
-    """The rings as one outline: shells counter-clockwise and holes clockwise, so that holes stay empty."""
+def _contour(polygons: shapely.Geometry) -> Contour:
+    """Join all rings to one contour: shells counter-clockwise and holes clockwise, so that holes stay empty."""
     parts = []
     for polygon in shapely.get_parts(polygons):
         for ring, is_shell in ((polygon.exterior, True), *((hole, False) for hole in polygon.interiors)):
             points = np.asarray(ring.coords)[:, :2]
             if len(points):
-                parts.append(Outline(points if ring.is_ccw == is_shell else points[::-1], closed=True))
-    return Outline.make_compound_path(*parts) if parts else Outline(np.empty((0, 2)))
+                parts.append(Contour(points if ring.is_ccw == is_shell else points[::-1], closed=True))
+    return Contour.make_compound_path(*parts) if parts else Contour(np.empty((0, 2)))
 
 
 def _draw_path(axes: Axes, drawing: Drawing) -> None:
     if len(drawing.path) == 0:
         return
     x, y = drawing.path[:, 0], drawing.path[:, 1]
-    swept = _outline(_swept(drawing.vehicle, drawing.path))
+    swept = _contour(_swept(drawing.vehicle, drawing.path))
     axes.add_patch(PathPatch(swept, facecolor=PATH, alpha=0.18, edgecolor="none", zorder=3))
     axes.plot(x, y, color=PATH, linewidth=2.4, solid_capstyle="round", solid_joinstyle="round", zorder=4)
 
 
 def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
-    """What the vehicle covers along a path, with straight lines from pose to pose."""
+    """Return the area that the vehicle sweeps along a path, with straight lines from pose to pose."""
     if not vehicle.footprint:
         line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
-        # Without the corners that are too flat to see, and most of the file.
+        # Corners that are too flat to see would make up most of the file.
         return line.buffer(vehicle.robot_radius).simplify(FLAT * vehicle.robot_radius)
     bodies = [_body(vehicle, pose) for pose in path]
     return shapely.union_all([shapely.union(*pair).convex_hull for pair in pairwise(bodies)] or bodies)
 
 
 def _body(vehicle: Vehicle, pose: Sequence[float]) -> shapely.Polygon:
-    """What the vehicle covers at a pose."""
+    """Return the area that the vehicle covers at a pose."""
     x, y, theta = pose
     if not vehicle.footprint:
         return shapely.Point(x, y).buffer(vehicle.robot_radius)
@@ -220,29 +220,30 @@ def _body(vehicle: Vehicle, pose: Sequence[float]) -> shapely.Polygon:
 
 
 def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:
-    """The vehicle and an arrow along its heading."""
+    """Draw the vehicle and an arrow along its heading."""
     x, y, theta = pose
-    body = _outline(_body(vehicle, pose))
+    body = _contour(_body(vehicle, pose))
     axes.add_patch(PathPatch(body, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
     axes.add_patch(PathPatch(body, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
-    outline = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
+    arrow = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
     place = Affine2D().rotate(theta).translate(x, y)
-    axes.add_patch(Polygon(place.transform(outline), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))
+    axes.add_patch(Polygon(place.transform(arrow), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))
 
 
-def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead: float, beside: float) -> None:
-    """A name at a distance ahead of a pose, or behind it, and clear of it; or else at another beside it."""
+def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead: float,
+               sideways: float) -> None:
+    """Write a name at a distance ahead of a pose, negative behind it; where it would leave the frame, at another sideways."""
     x, y, theta = pose
     dx, dy = ahead * math.cos(theta), ahead * math.sin(theta)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     if not (left < x + 2.5 * dx < right and low < y + 2.5 * dy < high):
-        # It would run over the frame: beside the pose, then, on the side of the map's middle.
-        dx, dy = (beside / abs(ahead) * length for length in (-dy, dx))
+        # It would run over the frame: to the side of the pose, then, that faces the middle of the map.
+        dx, dy = (sideways / abs(ahead) * length for length in (-dy, dx))
         if dx * (left + right - 2 * x) + dy * (low + high - 2 * y) < 0:
             dx, dy = -dx, -dy
     away = math.hypot(dx, dy)
-    row_gap = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
-    above = {-1: "top", 0: "center", 1: "bottom"}[round(dy / away)]
+    horizontal = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
+    vertical = {-1: "top", 0: "center", 1: "bottom"}[round(dy / away)]
     halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
-    axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=row_gap, va=above, path_effects=halo,
+    axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=horizontal, va=vertical, path_effects=halo,
               zorder=7)

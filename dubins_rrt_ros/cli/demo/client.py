@@ -1,4 +1,4 @@
-"""The demonstration's ROS side: a node of its own that asks the planner for a path."""
+"""The ROS side of the demonstration: a node of its own that asks the planner for a path over topics."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -17,22 +17,22 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from dubins_rrt_ros.node.conversions import grid_from, pose_from, pose_message
 from dubins_rrt_ros.planning import GridMap
+from dubins_rrt_ros.planning.maps.files import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.problem import Pose
 
 from .process import DemoError
 
 FRAME = "map"
-#: How long anything expected may take to arrive [s].
-PATIENCE = 30.0
-MAX_CELLS = 100_000_000
+#: Time limit for anything expected to arrive [s].
+TIMEOUT = 30.0
 FIGURES = ("path_length", "lower_bound", "gap", "time_to_first", "planning_time", "samples", "tree_nodes")
 
 
 class Answer(NamedTuple):
-    """What the planner published.
+    """The messages of the planner.
 
     Attributes:
-        figures: of the final status, by name.
+        figures: the figures of the final status, by name.
         map: the map.
         path: (n, 3) poses.
         tree: (m, 2, 2) line segments.
@@ -45,10 +45,10 @@ class Answer(NamedTuple):
 
 
 class DemoClient:
-    """A context with a node in it.
+    """A context manager that runs a node.
 
     Args:
-        check: called while waiting; it raises where waiting is in vain.
+        check: called while waiting; raises where waiting is in vain.
     """
 
     def __init__(self, check: Callable[[], None]):
@@ -73,10 +73,10 @@ class DemoClient:
         rclpy.try_shutdown(context=self._context)
 
     def ask(self, start: Pose, goal: Pose, parameters: Mapping[str, Any]) -> Answer:
-        """The planner's answer when it has used its budget.
+        """Ask for a path, and return the planner's answer when it has used its budget.
 
         Raises:
-            DemoError: it found no path, or something did not arrive.
+            DemoError: it found no path, or something did not arrive in time.
         """
         self._wait(lambda: "map" in self._latest, "no map")
         self._publish(self._start, start)
@@ -84,11 +84,11 @@ class DemoClient:
         self._wait(lambda: _is_final(self._values(), parameters), "no final status")
         self._check_path()
         self._wait(self._has_path, "no path")
-        # Only now, for the node builds the tree's markers only for those who look, and that takes time from planning.
+        # Only now: the node builds the markers of the tree while somebody subscribes, and that takes time from planning.
         self._subscribe(MarkerArray, "planner/tree")
         self._wait(lambda: "planner/tree" in self._latest, "no tree")
         figures = {name: float(self._values()[name]) for name in FIGURES}
-        return Answer(figures, grid_from(self._latest["map"], FRAME, MAX_CELLS), self._path(),
+        return Answer(figures, grid_from(self._latest["map"], FRAME, MAX_MAP_CELLS), self._path(),
                       _segments(self._latest["planner/tree"]))
 
     def _subscribe(self, kind: type, topic: str) -> None:
@@ -96,18 +96,18 @@ class DemoClient:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._node.create_subscription(kind, topic, lambda message: self._latest.__setitem__(topic, message), latched)
 
-    def _wait(self, condition: Callable[[], bool], complaint: str) -> None:
+    def _wait(self, condition: Callable[[], bool], missing: str) -> None:
         """Serve the topics until the condition holds."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while not condition():
             self._check()
             if time.monotonic() > deadline:
-                raise DemoError(f"{complaint} arrived within {PATIENCE:g} s; see whether a firewall "
+                raise DemoError(f"{missing} arrived within {TIMEOUT:g} s; see whether a firewall "
                                 "blocks UDP multicast on this machine")
             self._executor.spin_once(timeout_sec=0.1)
 
     def _publish(self, publisher: Publisher, pose: Pose) -> None:
-        """Publish, and see it arrive: the goal must not overtake the start."""
+        """Publish and wait for the acknowledgement: the goal must not overtake the start."""
         self._wait(lambda: publisher.get_subscription_count() > 0, f"no listener on {publisher.topic_name}")
         message = PoseStamped(pose=pose_message(pose))
         message.header.frame_id = FRAME
@@ -127,14 +127,14 @@ class DemoClient:
         return np.array([pose_from("plan", pose) for pose in self._latest["plan"].poses]).reshape(-1, 3)
 
     def _has_path(self) -> bool:
-        """Whether the path is that of the final status, which may come before it."""
+        """Return True if the path is that of the final status, which may arrive before it."""
         path = self._path() if "plan" in self._latest else np.empty((0, 3))
         length = np.hypot(*np.diff(path[:, :2], axis=0).T).sum()
         return abs(length / float(self._values()["path_length"]) - 1) < 1e-3
 
 
 def _is_final(values: Mapping[str, str], parameters: Mapping[str, Any]) -> bool:
-    """Whether a status tells of a failure or of a spent budget: RRT* publishes every improvement before."""
+    """Return True if a status reports a failure or a spent budget: RRT* publishes every improvement before."""
     if values.get("plan_id", "0") == "0":
         return False
     return (values["error_code"] != "0" or int(values["samples"]) >= parameters["samples"]

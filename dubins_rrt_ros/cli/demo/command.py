@@ -1,4 +1,4 @@
-"""`dubins_rrt demo`: start the node, send it a start and a goal over real topics, receive the path and draw it."""
+"""`dubins_rrt demo`: start the installed node, send it a start and a goal over topics, receive the path and draw it."""
 
 import argparse
 import contextlib
@@ -23,8 +23,8 @@ from .process import DemoError, PlannerProcess
 if TYPE_CHECKING:
     from .client import Answer
 
-PARAMETERS = {"planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000,
-              "planning_time": 2.0, "seed": 1}
+PARAMETERS: dict[str, Any] = {
+    "planner": "rrt_star", "turning_radius": 1.0, "robot_radius": 0.2, "samples": 3000, "planning_time": 2.0, "seed": 1}
 
 
 def add_arguments(parser: Parser) -> None:
@@ -36,12 +36,12 @@ def add_arguments(parser: Parser) -> None:
         examples=["dubins_rrt demo", "dubins_rrt demo --plot maze.svg --json demo.json"],
         exit_status="0 a path was received, 1 none: the reason is on standard error, 2 wrong usage, 130 interrupted")
     parser.add_argument("--plot", metavar="FILE", default="demo.png",
-                        help="the picture (.png, .svg, .pdf); default demo.png")
+                        help="picture to write (.png, .svg or .pdf); default demo.png")
     add_json_flag(parser, "what was received")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Demonstrate, and return the exit status: 0 with a path."""
+    """Run the demonstration, and return the exit status: 0 with a path."""
     check_folder(arguments.plot, arguments.json)
     check_drawing(arguments.plot)
     try:
@@ -59,14 +59,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _demonstrate() -> tuple["Answer", int]:
-    """The node's answer and its exit status.
+    """Return the answer of the node and its exit status.
 
     Raises:
-        DemoError: there is none.
+        DemoError: there is no answer.
     """
     if importlib.util.find_spec("rclpy") is None:
         raise DemoError(f"ROS 2 is not here (no module rclpy); run: {install_command('ros')}")
-    # A domain of its own and this machine alone: no robot nearby shall hear of it.
+    # A domain of its own, and this machine alone: no robot nearby may receive the goal.
     os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     from .client import DemoClient
     with _planner() as planner:
@@ -77,7 +77,7 @@ def _demonstrate() -> tuple["Answer", int]:
 
 @contextlib.contextmanager
 def _planner() -> Iterator[PlannerProcess]:
-    # SIGTERM ends this process as Ctrl-C does, so that it leaves no node behind.
+    # SIGTERM ends this process as Ctrl-C does, so that no node is left behind.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
         planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / f"{MAP}.yaml"}, log)
@@ -99,7 +99,7 @@ def _report(answer: "Answer") -> str:
 
 
 def _document(answer: "Answer") -> dict[str, Any]:
-    """What was received as what JSON can hold, by the names that a plan's file has."""
+    """Return the answer as JSON holds it, by the names of a plan's file."""
     figures = dict(answer.figures)
     return {"length": figures.pop("path_length"), **figures, "samples": int(figures["samples"]),
             "tree_nodes": int(figures["tree_nodes"]), "poses": answer.path.tolist(), "start": START, "goal": GOAL,
@@ -107,7 +107,7 @@ def _document(answer: "Answer") -> dict[str, Any]:
 
 
 def _draw(file: str, answer: "Answer") -> None:
-    from ..common.plots import Drawing, draw, figures_title, path_title  # here, for matplotlib is slow to import
+    from ..common.plots import Drawing, draw, figures_title, path_title  # here, since matplotlib is slow to import
     figures, vehicle = answer.figures, Vehicle(PARAMETERS["turning_radius"], PARAMETERS["robot_radius"])
     draw(file, Drawing(answer.map, START, GOAL, vehicle, answer.tree, answer.path,
                        path_title(PARAMETERS["planner"], figures["path_length"], figures["gap"]),

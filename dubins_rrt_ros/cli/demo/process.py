@@ -1,23 +1,25 @@
-"""The installed planner as a process of its own."""
+"""The installed planner node as a process, and the command that starts it."""
 
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import IO, Any
 
-from dubins_rrt_ros.planning.maps.locate import planner_command
+from dubins_rrt_ros.planning.maps.locate import PACKAGE, ament_prefixes
 
-#: How long the node may take to stop [s].
+#: Time limit for the node to stop [s].
 STOP_TIME = 10.0
 
 
 class DemoError(Exception):
-    """The demonstration failed; the message says where and what to do."""
+    """A failure of the demonstration; the message says where, and what to do."""
 
 
 class PlannerProcess:
-    """The installed node in a process group of its own; what it logs is kept for the message of a failure."""
+    """The installed node in a process group of its own, whose log is kept for the message of a failure."""
 
     def __init__(self, parameters: Mapping[str, Any], log: IO[str]):
         assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
@@ -26,7 +28,7 @@ class PlannerProcess:
                                          stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
 
     def check(self) -> None:
-        """Raise DemoError where the node has ended."""
+        """Raise DemoError if the node has ended."""
         status = self._process.poll()
         if status is not None:
             raise DemoError(f"the node ended with exit status {status}: {self._last_line()}")
@@ -45,3 +47,13 @@ class PlannerProcess:
         self._log.seek(0)
         lines = [line for line in self._log.read().splitlines() if line.strip()]
         return lines[-1] if lines else "it said nothing"
+
+
+def planner_command() -> list[str]:
+    """Return the command that starts the node: the executable of colcon or apt, that of pip, or the source tree's module."""
+    executables = [prefix / "lib" / PACKAGE / "planner" for prefix in ament_prefixes()]
+    if (Path(sys.prefix) / "lib" / PACKAGE).is_dir():
+        # Not the one in lib, which leaves it to the environment which interpreter it is run by.
+        executables.append(Path(sys.executable).parent / "planner")
+    executable = next((file for file in executables if os.access(file, os.X_OK)), None)
+    return [str(executable)] if executable else [sys.executable, "-m", f"{PACKAGE}.node"]

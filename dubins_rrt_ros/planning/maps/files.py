@@ -37,9 +37,11 @@ _FLAGS = {**dict.fromkeys(("0", "false", "no", "off"), False), **dict.fromkeys((
 #: The brightness that trinary files have for free, occupied and unknown cells, and the thresholds that tell them apart.
 _FREE_GREY, _OCCUPIED_GREY, _UNKNOWN_GREY = 254, 0, 205
 _SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
+#: Default maximum number of cells of a grid: ten kilometres square at a resolution of 1 m, half a kilometre at 5 cm.
+MAX_MAP_CELLS = 100_000_000
 
 
-def load_map(path: str | os.PathLike, *, max_map_cells: int = 100_000_000, map_directory: str = "") -> GridMap | PolygonMap:
+def load_map(path: str | os.PathLike, *, max_map_cells: int = MAX_MAP_CELLS, map_directory: str = "") -> GridMap | PolygonMap:
     """Load a map file; its ending says what it is.
 
     `.yaml`, `.yml`: map_server's format, by the rules of ROS 2 Jazzy. `.geojson`, `.json`: see

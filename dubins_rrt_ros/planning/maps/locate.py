@@ -1,4 +1,4 @@
-"""Where maps and the package's node are, whichever way it was installed."""
+"""Where maps are, whichever way the package was installed."""
 
 import os
 import re
@@ -13,14 +13,14 @@ PACKAGE = "dubins_rrt_ros"
 _URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<host>[^/]*)/?(?P<path>.*)", re.DOTALL)
 
 
-def _ament_prefixes() -> list[Path]:
-    """Where colcon and apt may have installed the package."""
+def ament_prefixes() -> list[Path]:
+    """List the prefixes to which colcon and apt may have installed packages."""
     return [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
 
 
 def _share_folders(package: str) -> list[Path]:
     """Where a package's shared files may be: with colcon or apt; our own also with pip, or in the source tree."""
-    folders = [prefix / "share" / package for prefix in _ament_prefixes()]
+    folders = [prefix / "share" / package for prefix in ament_prefixes()]
     if package == PACKAGE:
         folder = Path(__file__).resolve().parents[2]
         # Above lib/python3.12/site-packages/dubins_rrt_ros: of a workspace, too, that was not sourced.
@@ -95,13 +95,3 @@ def _package_path(package: str, path: str) -> Path:
     if share is None:
         raise MapNotFound(f"no package {package} in AMENT_PREFIX_PATH; correct its name, or source the workspace that has it")
     return share / path
-
-
-def planner_command() -> list[str]:
-    """The command that starts the node: the executable of colcon or apt, that of pip, or the source tree's module."""
-    executables = [prefix / "lib" / PACKAGE / "planner" for prefix in _ament_prefixes()]
-    if (Path(sys.prefix) / "lib" / PACKAGE).is_dir():
-        # Not the one in lib, which leaves it to the environment which interpreter it is run by.
-        executables.append(Path(sys.executable).parent / "planner")
-    executable = next((file for file in executables if os.access(file, os.X_OK)), None)
-    return [str(executable)] if executable else [sys.executable, "-m", f"{PACKAGE}.node"]
