@@ -1,1 +1,1 @@
-"""The ROS side: convert, call the planner, publish."""
+"""The ROS side: messages are converted, the planner is called, and paths are published."""

@@ -1,4 +1,4 @@
-"""`python -m dubins_rrt_ros.node` runs the planner node."""
+"""Entry point of `python -m dubins_rrt_ros.node`, which runs the planner node."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Messages to the library's types and back: pure functions."""
+"""Pure functions from messages to the library's types and back."""
 
 import array
 import math
@@ -16,27 +16,28 @@ from std_msgs.msg import Header
 from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, rasterise
 from dubins_rrt_ros.planning.problem import Pose
 
-#: How far a quaternion's norm may be from 1: three decimals of each component are enough.
+#: Maximum deviation of a quaternion's norm from 1: three decimals of each component are enough.
 NORM_TOLERANCE = 1e-3
-#: How far a pose's z axis may lean [rad].
+#: Maximum angle between a pose's z axis and the vertical [rad].
 TILT_TOLERANCE = 0.01
-#: The cells of a polygon map that is published as a grid, to be looked at: how small [m], and how many at most; that many
-#: take a second between simple polygons, and five between thousands of round ones.
-RASTER_RESOLUTION, RASTER_CELLS = 0.05, 200_000
+#: Minimum size of the cells of a polygon map that is published as a grid, for display [m].
+RASTER_RESOLUTION = 0.05
+#: Maximum number of those cells: they take a second with simple polygons, and five with thousands of round ones.
+RASTER_CELLS = 200_000
 
 
 def bare_pose(message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> PoseMessage:
-    """The pose in a message, without its header."""
+    """Return the pose in a message, without its header."""
     while not isinstance(message, PoseMessage):
         message = message.pose
     return message
 
 
 def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> Pose:
-    """The (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height does not matter.
+    """Return the (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height is ignored.
 
     Raises:
-        InvalidPose: it is not finite, no rotation or tilted; `name` is in the message.
+        InvalidPose: it is not finite, not a rotation, or tilted; `name` is in the message.
     """
     pose = bare_pose(message)
     p = pose.position
@@ -46,14 +47,14 @@ def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovariance
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """An (x, y, yaw) as a message, with w >= 0 in its quaternion."""
+    """Return an (x, y, yaw) as a message, with w >= 0 in its quaternion."""
     message = PoseMessage()
     _fill(message, *planar_rows(np.array([pose]))[0].tolist())
     return message
 
 
 def transformed(pose: PoseMessage, transform: Transform) -> PoseMessage:
-    """A pose in the frame that a transform leads to, as tf2 has it: rotate, then translate."""
+    """Return a pose in a transform's parent frame, as tf2 does: rotate, then translate."""
     t, p, q = transform.translation, pose.position, pose.orientation
     turn = _Quaternion(*(getattr(transform.rotation, axis) for axis in "wxyz"))
     x, y, z = _product(_product(turn, _Quaternion(0.0, p.x, p.y, p.z)), turn.conjugate)[1:]
@@ -79,12 +80,12 @@ def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
 
 
 def poses_of(plan: Plan | None) -> np.ndarray:
-    """(n, 3) poses of a plan's path at the spacing it asks for, none where there is no path."""
+    """Return the (n, 3) poses of a plan's path at the spacing of its settings, (0, 3) without a path."""
     return plan.path.poses(plan.settings.path_spacing) if plan is not None and plan.path is not None else np.empty((0, 3))
 
 
 def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
-    """(n, 3) poses as a path; without poses it is empty and tells that there is none."""
+    """Return (n, 3) poses as a path message; an empty one says that there is no path."""
     message = PathMessage(header=Header(stamp=stamp, frame_id=frame))
     for row in planar_rows(poses).tolist():
         stamped = PoseStamped()
@@ -102,16 +103,21 @@ def planar_rows(poses: np.ndarray) -> np.ndarray:
 
 
 def _fill(message: PoseMessage, x: float, y: float, z: float, w: float) -> None:
-    # To fill the fields that are there takes half the time of making new ones, which counts with hundreds of poses.
+    # Filling existing fields takes half the time of making new ones, which counts with hundreds of poses.
     message.position.x, message.position.y = x, y
     message.orientation.z, message.orientation.w = z, w
 
 
 def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap:
-    """The map of a message.
+    """Return the map of a message.
+
+    Args:
+        message: an occupancy grid.
+        frame: the global frame.
+        max_map_cells: maximum number of cells.
 
     Raises:
-        MapError: it is in another frame than `frame`, has no cells or too many, or its fields contradict each other.
+        MapError: it is in another frame, has no cells or too many, or its fields contradict each other.
     """
     info, name = message.info, "the map message"
     if message.header.frame_id not in ("", frame):
@@ -132,38 +138,38 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap
 
 
 def grid_message(grid: GridMap, frame: str, stamp: Time) -> OccupancyGrid:
-    """A grid map as a message."""
+    """Return a grid map as a message."""
     message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame))
     message.info.map_load_time = stamp
     message.info.height, message.info.width = grid.data.shape
     message.info.resolution = grid.resolution
     message.info.origin = pose_message(grid.origin)
-    # An array of bytes is taken over as it is; a list of four million numbers takes 190 ms.
+    # An array of bytes is taken as it is; a list of four million numbers takes 190 ms.
     message.data = array.array("b", grid.data.tobytes())
     return message
 
 
 def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
-    """A map as a grid that can be published."""
+    """Return a map as a grid, which can be published."""
     if isinstance(loaded, GridMap):
         return loaded
     width, height = np.ptp(loaded.corners(), axis=0)
-    # The last is for long and thin ones, whose ring of cells around counts.
+    # The last term is for long and thin maps, where the ring of cells around counts.
     return rasterise(loaded, max(RASTER_RESOLUTION, math.sqrt(width * height / RASTER_CELLS),
                                  6 * max(width, height) / RASTER_CELLS))
 
 
 def status_message(node: str, status: Status, message: str, *, plan_id: int = 0, revision: int = 0,
                    plan: Plan | None = None, map_id: str = "") -> DiagnosticStatus:
-    """A planning event for a person and for a program.
+    """Return a planning event as a message, for a person and for a program.
 
     Args:
         node: the fully qualified name of the node.
-        status: how the request ended or stands.
-        message: one sentence that says so.
-        plan_id, revision: which answer to which request; 0 where it belongs to none.
-        plan: the answer, where a planner ran; figures that there are not stay empty.
-        map_id: which map it is about.
+        status: the state of the request.
+        message: one sentence on it.
+        plan_id, revision: number of the request and of the answer to it; 0 where the event belongs to no request.
+        plan: the answer, where a planner ran; figures that do not exist stay empty.
+        map_id: id of the map that it is about.
     """
     values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
     values |= _figures(plan) | {"map_id": map_id}
@@ -183,7 +189,7 @@ def _figures(plan: Plan | None) -> dict[str, object]:
 
 
 def _text(value: object) -> str:
-    """All digits of a number, so that it reads back as it was."""
+    """Return a value as text, a number with all digits, so that it reads back unchanged."""
     if value is None:
         return ""
     return repr(float(value)) if isinstance(value, float) else str(value)
@@ -192,7 +198,7 @@ def _text(value: object) -> str:
 def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
     if status is Status.NO_MAP:
         return DiagnosticStatus.STALE
-    if status is Status.CANCELLED or (status is Status.NO_START and plan_id == 0):  # a start that no goal waits for yet
+    if status is Status.CANCELLED or (status is Status.NO_START and plan_id == 0):  # no goal waits for the start yet
         return DiagnosticStatus.WARN
     if status is not Status.NONE:
         return DiagnosticStatus.ERROR
@@ -203,10 +209,10 @@ def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
 
 
 def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:
-    """The turn about z of a quaternion [rad], in (-pi, pi]."""
+    """Return the rotation about z of a quaternion [rad], in (-pi, pi]."""
     written = f"x {q.x}, y {q.y}, z {q.z}, w {q.w}"
     norm = math.hypot(q.x, q.y, q.z, q.w)
-    if not abs(norm - 1) <= NORM_TOLERANCE:  # so written, not-a-number is refused too
+    if not abs(norm - 1) <= NORM_TOLERANCE:  # written so that NaN is refused too
         raise error(f"{what} has the quaternion {written}, which is no rotation: its norm is {norm:.6g}; "
                     "normalise it (no rotation is w 1).")
     tilt = 2 * math.asin(min(1.0, math.hypot(q.x, q.y) / norm))

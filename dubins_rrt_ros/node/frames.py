@@ -1,6 +1,6 @@
-"""Poses in the global frame, by tf2 where it is installed."""
+"""Transforms of poses to the global frame, by tf2 where it is installed."""
 
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Transform
 from rclpy.node import Node
 from rclpy.time import Time
 
@@ -12,12 +12,12 @@ from .request import Refusal
 
 try:
     import tf2_ros
-except ImportError:  # it comes with an installation of ROS, not with pip
+except ImportError:  # part of an installation of ROS, not of the packages for pip
     tf2_ros = None
 
 
 class Frames:
-    """Takes stamped poses to the global frame, by the latest transform."""
+    """Transforms stamped poses to the global frame, by the latest transform."""
 
     def __init__(self, node: Node, frame: str):
         self._logger = node.get_logger()
@@ -27,10 +27,10 @@ class Frames:
             self._listener = tf2_ros.TransformListener(self._buffer, node)
 
     def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped) -> Pose:
-        """The (x, y, yaw) of a message's pose in the global frame.
+        """Return the (x, y, yaw) of a message's pose in the global frame.
 
         Raises:
-            Refusal: it cannot be transformed, or is no pose; `name` is in the message.
+            Refusal: it cannot be transformed, or is not a pose; `name` is in the message.
         """
         pose, frame = bare_pose(message), message.header.frame_id
         if not frame:
@@ -42,7 +42,7 @@ class Frames:
         except InvalidPose as error:
             raise Refusal(Status.INVALID_POSE, str(error)) from None
 
-    def _latest(self, name: str, frame: str):
+    def _latest(self, name: str, frame: str) -> Transform:
         if tf2_ros is None:
             raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or")
         try:

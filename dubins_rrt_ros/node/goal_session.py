@@ -18,7 +18,7 @@ START_GRACE = 0.5
 
 
 class GoalSession:
-    """Plans to the newest goal, and publishes what comes of it. What belongs to an older goal is not published."""
+    """Plans to the newest goal and publishes the answers; those to older goals are dropped."""
 
     def __init__(self, node: Node, dispatcher: Dispatcher, readiness: Readiness, frames: Frames, outputs: Outputs,
                  path_check: PathCheck):

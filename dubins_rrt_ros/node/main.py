@@ -18,23 +18,23 @@ from .parameter_table import as_table
 from .parameters import OPTIONS
 from .planner_node import PlannerNode
 
-#: How long a signal may go unnoticed [s].
+#: Maximum time until a signal is noticed [s].
 SIGNAL_INTERVAL = 0.25
 #: Options of glibc's mallopt() by their numbers, M_MMAP_THRESHOLD [bytes] and M_ARENA_MAX, and what they are set to.
 MALLOC_OPTIONS = {-3: 128 * 1024, -8: 2}
 
 
 class ConfigurationError(Exception):
-    """The node cannot start as it is configured; the message, of one line, names what to change."""
+    """A configuration with which the node cannot start; the message, of one line, names what to change."""
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node; the exit status is 1 where its configuration cannot be used."""
+    """Run the node and return the exit status: 1 where its configuration cannot be used."""
     _give_memory_back()
     try:
         return _run(sys.argv if args is None else args)
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0  # SIGINT and SIGTERM are how it ends, also while something is published, which then fails
+        return 0  # SIGINT and SIGTERM end it regularly, also while something is published, which then fails
     except ConfigurationError as error:
         print(f"planner: {error}", file=sys.stderr)
         return 1
@@ -63,26 +63,26 @@ def _run(arguments: list[str]) -> int:
         executor.add_node(node)
         _spin(executor, node)
     finally:
-        # A second signal must not break off the end.
+        # A second signal must not interrupt the shutdown.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if node is not None:
             node.close()
         if executor is not None:
-            executor.shutdown()  # left to the garbage collector, it may come after what it refers to, with a traceback
+            executor.shutdown()  # the garbage collector may take it after what it refers to, with a traceback
         with contextlib.suppress(RuntimeError):  # the signal's own thread may be first
             rclpy.try_shutdown()
     return 0
 
 
 def _spin(executor: SingleThreadedExecutor, node: PlannerNode) -> None:
-    # Not spin(): a signal can come between its look at the context and its wait, which then lasts for ever.
+    # Not spin(): a signal can come between its check of the context and its wait, which then never ends.
     while rclpy.ok():
         try:
             executor.spin_once(timeout_sec=SIGNAL_INTERVAL)
         except ExternalShutdownException:
             raise
-        except Exception as error:  # of any kind: the node lives on
+        except Exception as error:  # of any kind: the node goes on
             if not rclpy.ok():  # a signal came while something was published, which then fails
                 raise ExternalShutdownException from error
             node.report_defect(error)
@@ -109,7 +109,7 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
-    """The arguments that are not ROS's; prints the help and exits where it is asked for, or where there are others."""
+    """Return the arguments that are not ROS's. Prints the help and exits where it is asked for, or an argument is unknown."""
     lines = [f"  {item.name} (default {item.default!r}): {item.describe()}" for item in OPTIONS.values()]
     parser = argparse.ArgumentParser(
         prog="planner", description="Plan Dubins paths from start_pose to each goal_pose on a map, with RRT or RRT*.",

@@ -16,24 +16,24 @@ PATH_COLOR = ColorRGBA(r=0.90, g=0.30, b=0.10, a=1.0)
 START_COLOR = ColorRGBA(r=0.10, g=0.60, b=0.20, a=1.0)
 GOAL_COLOR = ColorRGBA(r=0.75, g=0.10, b=0.50, a=1.0)
 CULPRIT_COLOR = ColorRGBA(r=0.95, g=0.75, b=0.05, a=0.9)
-#: A chord as long as this share of the turning radius strays from its arc by 1 % of the radius.
+#: Length of a chord in turning radii; it deviates from its arc by 1 % of the radius.
 CHORD = 0.3
 
 
-def tree_markers(plan: Plan | None, frame: str, stamp: Time, most: int) -> MarkerArray:
-    """Clears what was shown, then shows the tree, start, goal and path of `plan`, if there is one, and where it failed.
+def tree_markers(plan: Plan | None, frame: str, stamp: Time, max_lines: int) -> MarkerArray:
+    """Return markers that clear what was shown, then show tree, start, goal and path of a plan, and where it failed.
 
     Args:
-        plan: what to show.
+        plan: what to show; None to clear only.
         frame, stamp: of every marker.
-        most: how many lines of the tree at most, those of its oldest nodes: a large tree keeps RViz and the node busy.
+        max_lines: maximum number of lines of the tree, those of its oldest nodes: a large tree keeps RViz and the node busy.
     """
     header = Header(stamp=stamp, frame_id=frame)
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     if plan is not None:
         radius = plan.problem.vehicle.turning_radius
         width = 0.02 * radius
-        markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius, most), width, TREE_COLOR)
+        markers += _lines(header, "tree", Marker.LINE_LIST, plan.tree.segments(CHORD * radius, max_lines), width, TREE_COLOR)
         markers.append(_arrow(header, "start", plan.problem.start, radius, START_COLOR))
         markers.append(_arrow(header, "goal", plan.problem.goal, radius, GOAL_COLOR))
         if plan.location is not None:
@@ -46,7 +46,7 @@ def tree_markers(plan: Plan | None, frame: str, stamp: Time, most: int) -> Marke
 
 def _lines(header: Header, namespace: str, kind: int, points: np.ndarray, width: float,
            color: ColorRGBA) -> list[Marker]:
-    """One marker for all the lines, or none: RViz complains of lines without points."""
+    """Return one marker for all lines, or none: RViz complains of lines without points."""
     points = np.asarray(points, dtype=float).reshape(-1, 2)
     if len(points) < 2:
         return []

@@ -1,4 +1,4 @@
-"""What the node says: path, status, tree, diagnostics and log."""
+"""The node's output: path, status, tree, diagnostics and log."""
 
 import time
 from typing import Any
@@ -125,7 +125,7 @@ class Outputs:
             self._tree_is_clear = plan is None
 
     def _on_tree_matched(self, matched: Any) -> None:
-        """Show the last tree to a subscriber that came after it: nobody built it then."""
+        """Show the last tree to a late subscriber: it is not built while nobody subscribes."""
         if matched.current_count_change > 0:
             self._show_tree(FINAL_TREE)
 

@@ -1,7 +1,8 @@
-"""Files that set the node's parameters: one with all of them, and those that are passed over in silence."""
+"""Parameter files: one with all defaults, and warnings about those that ROS ignores silently."""
 
 import json
 import os
+import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -16,31 +17,31 @@ from dubins_rrt_ros.planning.text import one_line
 
 from .parameters import CLASSES, READ_ONLY, read_only
 
-#: The columns of a parameter file that is written.
+#: Maximum line length of a parameter file that is written [characters].
 WIDTH = 100
-#: The longest file that is looked at [bytes]; PyYAML may take three seconds for as much.
+#: Maximum size of a file that is read [bytes]; PyYAML may take three seconds for that.
 MAX_BYTES = 64 * 2**10
 
 
 def as_yaml() -> str:
-    """A parameter file, for a node of any name, of all options with their defaults; what each one takes stands above it."""
+    """Return a parameter file for a node of any name, with all defaults; a comment above each says what it takes."""
     lines = [*_comment("The planner's parameters with their defaults, as `planner --print-parameters` prints them.", ""),
              "/**:", "  ros__parameters:"]
     for cls, title in CLASSES.items():
         lines += ["", f"    # --- {title} ---"]
         for item in options(cls):
             about = item.describe() + (f"; {read_only(item.name)}" if item.name in READ_ONLY else "")
-            # Of YAML's ways to write a value, JSON's are those that nothing takes for another type.
+            # JSON is the part of YAML in which no value is mistaken for one of another type.
             lines += ["", *_comment(about, "    "), f"    {item.name}: {json.dumps(item.default)}"]
     return "\n".join(lines) + "\n"
 
 
 def unused_files(arguments: Sequence[str], node_name: str) -> list[str]:
-    """A warning, of one sentence, for each parameter file that names other nodes only: ROS passes over it in silence.
+    """Return a warning, of one sentence, for each parameter file that names other nodes only: ROS ignores it silently.
 
     Args:
-        arguments: the command line. Its files are read; what cannot be read gives no warning, as ROS refuses it.
-        node_name: the node's full name, such as /planner.
+        arguments: the command line. A file that cannot be read gives no warning, as ROS refuses it.
+        node_name: the node's fully qualified name, such as /planner.
     """
     warnings = []
     for file in _parameter_files(arguments):
@@ -67,12 +68,12 @@ def _parameter_files(arguments: Sequence[str]) -> Iterator[str]:
 
 
 def _named_nodes(file: str) -> list[str] | None:
-    """The nodes that a parameter file has a section for, by their full names or wildcards; None where it cannot be read."""
+    """Return the names or wildcards of the nodes that a file has sections for; None where it cannot be read."""
     try:
-        # A pipe, which ROS has read by now, would wait for more.
+        # A pipe, which ROS has read already, would block.
         if not os.path.isfile(file) or os.path.getsize(file) > MAX_BYTES:
             return None
-        return list(_sections(load_plain(Path(file).read_text("utf-8"), aliases=False)))  # ROS takes none either
+        return list(_sections(load_plain(Path(file).read_text("utf-8"), aliases=False)))  # which ROS refuses too
     except (OSError, ValueError, RecursionError, OverflowError, yaml.YAMLError):
         return None
 
@@ -86,12 +87,7 @@ def _sections(tree: Any, name: str = "") -> Iterator[str]:
 
 
 def _is_for(section: str, node_name: str) -> bool:
-    """Whether a section applies to a node, as rcl and rclpy see it: `*` is any one name, `**` any number of them."""
-    names = node_name.split("/")[1:]
-    matched = {0}  # how many of the names the parts so far can stand for
-    for part in section.split("/")[1:]:
-        if part == "**" and matched:
-            matched = set(range(min(matched), len(names) + 1))
-        else:
-            matched = {count + 1 for count in matched if count < len(names) and part in ("*", names[count])}
-    return len(names) in matched
+    """Return True if a section applies to a node, as rcl and rclpy see it: `*` is any one name, `**` any number of them."""
+    parts = re.sub(r"(/\*\*)+", "/**", section).split("/")[1:]
+    wildcards = {"*": "/[^/]+", "**": "(/[^/]+)*"}
+    return re.fullmatch("".join(wildcards.get(part, "/" + re.escape(part)) for part in parts), node_name) is not None

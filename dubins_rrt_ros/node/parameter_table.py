@@ -1,4 +1,4 @@
-"""The table of all parameters that the README has, in Markdown."""
+"""A table of all parameters in Markdown, which the README shows."""
 
 import json
 import re
@@ -7,12 +7,12 @@ from dubins_rrt_ros.planning.option import Option
 
 from .parameters import OPTIONS, READ_ONLY
 
-#: A row is kept within this width, where that can be [characters].
+#: Maximum width of a row, where its first three cells leave room [characters].
 WIDTH = 130
 
 
 def as_table() -> str:
-    """A row for each parameter: its name, its default, what it takes and, as far as there is room, what it is for."""
+    """Return a row for each parameter: name, default, values it takes and, as far as there is room, its meaning."""
     lines = [_row("parameter", "default", "takes", "meaning"), "|---|---|---|---|"]
     for item in OPTIONS.values():
         cells = f"`{item.name}`", _default(item), _taken(item)
@@ -29,13 +29,13 @@ def _default(item: Option) -> str:
 
 
 def _taken(item: Option) -> str:
-    """What the option takes, in fewer words than by `allowed()`, as its default shows its type."""
+    """Return what the option takes, in fewer words than `allowed()`, as the default shows the type."""
     taken = re.sub("one of |an? (number|integer) from ", "", item.allowed()).replace("true or false", "true, false")
     return taken + (f" {item.unit}" if item.unit else "") + ("; read-only" if item.name in READ_ONLY else "")
 
 
 def _within(room: int, item: Option) -> str:
-    """The help, without so many of its last clauses that it has room; the choices are told of all together or not at all."""
+    """Return the help, shortened clause by clause from its end to `room` characters; choices are explained all or not at all."""
     text = item.help
     if len(text) > room and item.choices:
         text = text.partition(": ")[0]

@@ -1,4 +1,4 @@
-"""The node's parameters, declared from the options of the library's dataclasses."""
+"""The node's parameters, declared from the options of dataclasses: the library's and the node's own."""
 
 import difflib
 from collections.abc import Iterable, Mapping
@@ -14,19 +14,19 @@ from dubins_rrt_ros.planning.option import Option, convert_options, option
 
 @dataclass(frozen=True)
 class NodeOptions:
-    """What concerns the node and not the planner.
+    """Options of the node itself, not of the planner.
 
     Raises:
         OptionError: a field is of the wrong type or out of range.
     """
 
-    map_file: str = option("", "a map file, its URL, or the name of an installed map; empty: the map comes by topic")
-    map_directory: str = option("", "the directory that load_map may read from, with its subdirectories, once links are "
+    map_file: str = option("", "map file, its URL, or the name of an installed map; empty: the map comes by topic")
+    map_directory: str = option("", "directory that load_map may read from, with its subdirectories, after links are "
                                     "followed; map_file may be elsewhere; empty: any")
-    global_frame: str = option("map", "the frame of map, poses and path")
-    map_transient_local: bool = option(True, "the map topic's publisher is transient local, as map_server's is")
-    max_map_cells: int = option(MAX_MAP_CELLS, "the largest map that is taken", unit="cells", low=1, high=2**31 - 1)
-    publish_tree: bool = option(True, "show the tree on ~/tree while somebody subscribes")
+    global_frame: str = option("map", "frame of map, poses and path")
+    map_transient_local: bool = option(True, "subscribe to the map as transient local, as map_server publishes it")
+    max_map_cells: int = option(MAX_MAP_CELLS, "maximum size of a map", unit="cells", low=1, high=2**31 - 1)
+    publish_tree: bool = option(True, "publish the tree on ~/tree while somebody subscribes")
     replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
                                                "is no longer free")
     check_invariants: bool = option(False, "for debugging: check the invariants of every answer, its path and its tree before "
@@ -40,7 +40,12 @@ class NodeOptions:
 
 @dataclass(frozen=True)
 class Configuration:
-    """The parameters' values at one time; `problem` holds the options of Problem by name."""
+    """The parameters' values at one time.
+
+    Attributes:
+        node, vehicle, settings: the options of these classes.
+        problem: the options of Problem by name.
+    """
 
     node: NodeOptions
     vehicle: Vehicle
@@ -48,26 +53,27 @@ class Configuration:
     problem: Mapping[str, Any]
 
 
-#: The classes whose options are parameters, and what they are about.
+#: The classes whose options are parameters, and the titles of their sections.
 CLASSES = {NodeOptions: "The node", Vehicle: "The vehicle", Problem: "The request", Settings: "The planner"}
 OPTIONS: dict[str, Option] = {item.name: item for cls in CLASSES for item in options(cls)}
 _RESTART = "start the node again with another value"
-#: They shape topics and are read once, as a change at run time would have no effect, or limit what anyone on the network may
-#: do, a change of parameters included; and what to do instead.
+#: Parameters that cannot be changed at run time, and what to do instead. They shape topics, where a change would have no
+#: effect, or limit what anyone on the network may do.
 READ_ONLY = {"map_file": f"load another map by ~/load_map, or {_RESTART}", "map_directory": _RESTART, "global_frame": _RESTART,
              "map_transient_local": _RESTART}
 
 
 class Parameters:
-    """The parameters of a node.
+    """The parameters of a node. A change of several is accepted as a whole or refused as a whole, with the reason.
 
-    A change is taken whole or refused whole, with the reason.
+    Args:
+        node: an rclpy Node, on which they are declared.
 
     Raises:
         OptionError: a value given at start-up is of the wrong type or out of range, or does not fit the others.
     """
 
-    def __init__(self, node):
+    def __init__(self, node: Any):
         self._node = node
         for item in OPTIONS.values():
             _declare(node, item)
@@ -76,19 +82,19 @@ class Parameters:
         node.add_on_set_parameters_callback(self.check)
 
     def read(self) -> Configuration:
-        """The present values."""
+        """Return the present values."""
         return configuration(self._values())
 
     def unknown(self) -> list[str]:
-        """A warning, of one sentence, for each value given at start-up whose parameter is declared by nobody."""
-        # rclpy has no public way to the values that were given; without this one nothing is lost but the warnings.
+        """Return a warning, of one sentence, for each value given at start-up whose parameter is not declared."""
+        # rclpy has no public access to the values that were given; where this attribute is missing, only the warnings are lost.
         given = getattr(self._node, "_parameter_overrides", {})
         return [_unknown(name) for name in given if not (self._node.has_parameter(name) or name.startswith("qos_overrides."))]
 
     def check(self, changes: Iterable) -> SetParametersResult:
-        """Whether changes, given as rclpy's Parameters, can be taken together; the reason of a refusal says what to do.
+        """Say whether changes, given as rclpy's Parameters, can be made together; the reason of a refusal names the remedy.
 
-        rclpy asks it last, after its own checks of ranges and of what is read-only, whose reasons name no remedy.
+        rclpy calls this last, after its own checks of ranges and read-only parameters, whose reasons name no remedy.
         """
         wanted = {change.name: change.value for change in changes if change.name in OPTIONS}
         try:
@@ -113,7 +119,7 @@ class Parameters:
 
 
 def configuration(values: Mapping[str, Any]) -> Configuration:
-    """The values of all options as the library's types.
+    """Return the values of all options as the library's types.
 
     Raises:
         OptionError: one is of the wrong type or out of range, or they do not fit each other.
@@ -124,7 +130,7 @@ def configuration(values: Mapping[str, Any]) -> Configuration:
 
 
 def descriptor(item: Option) -> ParameterDescriptor:
-    """What `ros2 param describe` tells of an option."""
+    """Return the descriptor of an option, which `ros2 param describe` shows."""
     result = ParameterDescriptor(name=item.name, description=item.describe(), read_only=item.name in READ_ONLY,
                                  additional_constraints=item.allowed() if item.choices else read_only(item.name),
                                  dynamic_typing=True)  # so that 1 is taken where 1.0 is meant
@@ -137,8 +143,8 @@ def descriptor(item: Option) -> ParameterDescriptor:
     return result
 
 
-def _declare(node, item: Option) -> None:
-    # The full descriptor comes after our own check: its refusal would not say what to do.
+def _declare(node: Any, item: Option) -> None:
+    # The full descriptor comes after our own check: a refusal by its range names no remedy.
     parameter = node.declare_parameter(item.name, item.default, ParameterDescriptor(dynamic_typing=True))
     item.convert(parameter.value)
     node.set_descriptor(item.name, descriptor(item))
@@ -151,12 +157,12 @@ def _check_alone(name: str, value: Any) -> None:
 
 
 def read_only(name: str) -> str:
-    """What to do in place of changing a parameter at run time; "" where it can be changed."""
+    """Return what to do instead of changing a parameter at run time; "" where it can be changed."""
     return f"read-only while the node runs: {READ_ONLY[name]}" if name in READ_ONLY else ""
 
 
 def _unknown(name: str) -> str:
-    # A section that is nested too deep puts its name in front.
+    # A section that is nested too deep is part of the name.
     near = difflib.get_close_matches(name.rpartition(".")[2].lower(), OPTIONS, n=1)
     remedy = f"did you mean {near[0]!r}?" if near else "planner --help lists the parameters"
     return f"Unknown parameter {name!r} is ignored; {remedy}"

@@ -1,4 +1,4 @@
-"""A request to the planner, as a job for a worker. It knows nothing of ROS."""
+"""A request to the planner, as work for a worker. It knows nothing of ROS."""
 
 import time
 from collections.abc import Callable
@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan
 
-#: Improvements of a path are reported at most once in this time [s].
+#: Minimum time between two reports of an improved path [s].
 IMPROVEMENT_INTERVAL = 0.1
-#: How long a cancellation may go unnoticed while a map is prepared [s].
+#: Maximum time until a cancellation is noticed while a map is prepared [s].
 PREPARING_INTERVAL = 0.01
 
 
@@ -23,13 +23,13 @@ class Refusal(Exception):
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """What to plan.
+    """A request to plan.
 
     Attributes:
         id: the plan_id of its answers.
-        problem, settings: what plan() takes.
-        world: the problem's map, prepared.
-        check_invariants: whether every answer is checked, the improvements too.
+        problem, settings: the arguments of plan().
+        world: the problem's map, once it is prepared.
+        check_invariants: True if every answer is checked, improvements too.
     """
 
     id: int
@@ -39,15 +39,15 @@ class PlanRequest:
     check_invariants: bool = False
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
-        """Plan.
+        """Plan, and return the answer.
 
         Args:
             improved: called with the first path at once, and with improvements at most every IMPROVEMENT_INTERVAL, unless
                 the request is cancelled; None where nobody waits for them.
-            cancelled: asked about every 10 ms.
+            cancelled: called about every 10 ms; True ends the request.
 
         Raises:
-            Refusal: it was cancelled before it was begun.
+            Refusal: it was cancelled before planning began.
             PlanError, PathError, TreeError: an answer broke an invariant.
         """
         problem = self._prepared_problem(cancelled)
@@ -67,7 +67,7 @@ class PlanRequest:
         return answer
 
     def _prepared_problem(self, cancelled: Callable[[], bool]) -> Problem:
-        """The problem in its world, once that is there."""
+        """Wait for the world, and return the problem in it."""
         while not cancelled() and wait([self.world], PREPARING_INTERVAL).not_done:
             pass
         if cancelled():
@@ -76,7 +76,7 @@ class PlanRequest:
 
 
 class _Throttle:
-    """Lets the first improvement pass at once and later ones when the interval is over, however long ago they came."""
+    """Passes the first improvement at once, and later ones when the interval is over, even if they came long before."""
 
     def __init__(self, interval: float):
         self._interval = interval
@@ -84,6 +84,11 @@ class _Throttle:
         self._pending = False
 
     def lets_pass(self, improved: bool) -> bool:
+        """Return True if the best path is to be reported now.
+
+        Args:
+            improved: True if it became better since the last call.
+        """
         self._pending |= improved
         now = time.monotonic()
         if not self._pending or now < self._due:

@@ -13,7 +13,7 @@ Done = Callable[[Any], None]
 
 
 class Job:
-    """A handle of what was submitted to a worker. It keeps nothing of it alive."""
+    """A handle of what was submitted to a worker; it does not keep that alive."""
 
     def __init__(self):
         self._cancelled = threading.Event()

@@ -292,7 +292,8 @@ def test_an_approximate_or_cancelled_path_is_a_warning(plans):
 
     plan = plans["solved"]
     cancelled = replace(plan, cancelled=True)
+    waypoints = np.vstack([plan.path.waypoints[:-1], (8.4, 5.0, 0.5)])
     approximate = replace(plan, problem=replace(plan.problem, goal_tolerance_xy=0.2),
-                          path=replace(plan.path, end=(8.4, 5.0, 0.5)))
+                          path=replace(plan.path, waypoints=waypoints))
     for doubtful in (cancelled, approximate):
         assert status_message("/planner", Status.NONE, "", plan=doubtful).level == DiagnosticStatus.WARN
