@@ -17,8 +17,8 @@ from .curves.path import Path
 from .diagnosis import explain
 from .problem import Problem
 from .result import Plan, Progress, Status, gap_above
-from .search.cost_to_go import DistanceField
-from .search.headings import FOLLOW_FIELD
+from .search.cost_to_go import CostToGo
+from .search.headings import FOLLOW_COST_TO_GO
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
@@ -133,24 +133,24 @@ class _Call:
 
     def _search(self, field: ClearanceField) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
-        search = Search(self._problem, self._settings, field, self._distances_if_needed(field))
+        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field))
         best, reported = math.inf, 0.0
         cancelled = False
-        while not (search.done or ((self._out_of_time or cancelled) and search.may_end)):
-            search.grow()
+        for may_end in () if self._out_of_time else search.run():
             cancelled = cancelled or self._cancel()
             if search.best >= 0 and self._time_to_first is None:
                 self._time_to_first = self._elapsed
-            length = search.length
-            improved = length is not None and length < best - LEAST_IMPROVEMENT
+            improved = search.cost < best - LEAST_IMPROVEMENT
             if improved or self._elapsed - reported >= REPORT_INTERVAL:
-                best, reported = length or math.inf, self._elapsed
-                self._on_progress(Progress(search.samples, reported, length, improved, lambda: self._snapshot(search)))
+                best, reported = search.cost, self._elapsed
+                self._on_progress(Progress(search.samples, reported, search.length, improved, lambda: self._snapshot(search)))
+            if may_end and (cancelled or self._out_of_time):
+                break
         return self._end_of(search, field, cancelled)
 
-    def _distances_if_needed(self, field: ClearanceField) -> DistanceField | None:
-        needed = self._settings.informed or self._settings.heading_sampling in FOLLOW_FIELD
-        return DistanceField.to_goal(self._problem, field) if needed else None
+    def _cost_to_go_if_needed(self, field: ClearanceField) -> CostToGo | None:
+        needed = self._settings.informed or self._settings.heading_sampling in FOLLOW_COST_TO_GO
+        return CostToGo.to_goal(self._problem, field) if needed else None
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
@@ -162,8 +162,7 @@ class _Call:
     def _end_of(self, search: Search, field: ClearanceField, cancelled: bool) -> Plan:
         """Return the plan of a search that has ended."""
         if path := search.path:
-            if self._settings.informed:
-                self._bound = lower_bound(self._problem, search.make_bound())
+            self._bound = lower_bound(self._problem, search.make_bound())
             return self._with_path(path, search.tree, search.samples, cancelled=cancelled and not search.done)
         return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
 

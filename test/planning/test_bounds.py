@@ -22,7 +22,7 @@ from support.cases import (
 from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Status, Vehicle, plan
 from dubins_rrt_ros.planning.collision import clearance
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 MAPS = {
@@ -92,7 +92,7 @@ def test_no_way_is_shorter_and_the_shortest_is_little_longer(kind):
         points = free_points(rng, map, need + 0.05, 60)
         if len(points) < 10:
             continue
-        field = DistanceField(ClearanceField(map), need, points[0]).make_bound()
+        field = CostToGo(ClearanceField(map), need, points[0]).make_bound()
         found = field.at(points[1:])
         lengths = lattice_lengths(map, need, points[0], points[1:], 0.1)
         assert (found <= lengths + 1e-9).all()
@@ -109,13 +109,13 @@ def test_no_gradient_is_above_one_and_the_source_costs_nothing(seed):
     problem, clearance = random_problem(rng, random_maps(30)[seed])
     field = ClearanceField(problem.map, problem.allow_unknown)
     _, squares = field.free_squares(problem.vehicle.robot_radius)
-    for found in DistanceField.to_goal(problem, field).make_bound(), DistanceField.from_start(problem, field).make_bound():
+    for found in CostToGo.to_goal(problem, field).make_bound(), CostToGo.from_start(problem, field).make_bound():
         steep = slopes(found, squares)
         assert len(steep) == 0 or steep.max() <= 1
     bearing, share = rng.uniform(-math.pi, math.pi, 200), rng.random(200)
     places = problem.goal[:2] + (problem.goal_tolerance_xy * share * [np.cos(bearing), np.sin(bearing)]).T
     free = clearance(places) >= problem.vehicle.robot_radius
-    assert (DistanceField.to_goal(problem, field).make_bound().at(places[free]) == 0).all()
+    assert (CostToGo.to_goal(problem, field).make_bound().at(places[free]) == 0).all()
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_every_place_that_is_free_lies_in_a_free_square(seed):
     map, need = random_maps(30)[seed], rng.uniform(0.05, 0.5)
     points = free_points(rng, map, need, 400)
     for source in points[:5]:
-        found = DistanceField(ClearanceField(map), need, source).make_bound()
+        found = CostToGo(ClearanceField(map), need, source).make_bound()
         assert found.at(source[None])[0] == 0
         near = source + rng.normal(0, 0.01, (20, 2))
         near = near[naive_clearance(map)(near) >= need]
@@ -141,8 +141,8 @@ def test_the_way_there_is_as_long_as_the_way_back(seed):
     one, other = (free_pose(rng, map, naive_clearance(map), 0.25) for _ in range(2))
     problem = Problem(map, Vehicle(0.5, 0.2), one, other)
     field = ClearanceField(map)
-    to_goal = DistanceField.to_goal(problem, field).make_bound()
-    from_start = DistanceField.from_start(problem, field).make_bound()
+    to_goal = CostToGo.to_goal(problem, field).make_bound()
+    from_start = CostToGo.from_start(problem, field).make_bound()
     there, back = to_goal.at(np.array([one[:2]]))[0], from_start.at(np.array([other[:2]]))[0]
     if math.isinf(there) or math.isinf(back):
         assert there == back
@@ -156,22 +156,22 @@ def test_no_path_is_shorter_than_the_bound(seed):
     rng = np.random.default_rng(100 + seed)
     problem, _ = random_problem(rng, random_maps(30)[seed])
     field = ClearanceField(problem.map, problem.allow_unknown)
-    bound = lower_bound(problem, DistanceField.to_goal(problem, field).make_bound())
+    bound = lower_bound(problem, CostToGo.to_goal(problem, field).make_bound())
     assert bound >= lower_bound(problem)
     result = plan(problem, Settings(samples=scaled(3000, least=200), seed=seed, planning_time=60.0))
     if result.status == Status.NONE:
         assert result.length >= bound - 1e-9
         places = result.path.poses(0.05)[:, :2]
         driven = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
-        assert (DistanceField.to_goal(problem, field).make_bound().at(places) <= result.length - driven + 1e-9).all()
-        assert (DistanceField.from_start(problem, field).make_bound().at(places) <= 1.01 * driven + 1e-9).all()
+        assert (CostToGo.to_goal(problem, field).make_bound().at(places) <= result.length - driven + 1e-9).all()
+        assert (CostToGo.from_start(problem, field).make_bound().at(places) <= 1.01 * driven + 1e-9).all()
 
 
 def test_in_the_open_the_distance_is_the_straight_line():
     rng = np.random.default_rng(1)
     points = rng.uniform(-9, 9, (500, 2))
     straight = np.hypot(*(points - (3, -2)).T)
-    found = DistanceField(ClearanceField(empty_map()), 0.2, (3.0, -2.0)).make_bound().at(points)
+    found = CostToGo(ClearanceField(empty_map()), 0.2, (3.0, -2.0)).make_bound().at(points)
     assert (found <= straight).all()
     assert (found >= 0.97 * straight - 0.5).all()
 
@@ -179,7 +179,7 @@ def test_in_the_open_the_distance_is_the_straight_line():
 @pytest.mark.parametrize("tolerance", [0.05, 0.4, 2.5, 1e6])
 def test_the_distance_is_that_to_where_the_goal_is_reached(tolerance):
     problem = Problem(empty_map(), Vehicle(0.5, 0.2), (-8, 5, 0), (3, -2, 0), goal_tolerance_xy=tolerance)
-    found = DistanceField.to_goal(problem, ClearanceField(problem.map)).make_bound()
+    found = CostToGo.to_goal(problem, ClearanceField(problem.map)).make_bound()
     points = np.random.default_rng(2).uniform(-9, 9, (500, 2))
     straight = np.maximum(np.hypot(*(points - (3, -2)).T) - tolerance, 0)
     assert (found.at(points) <= straight).all()
@@ -191,7 +191,7 @@ def test_behind_a_wall_and_in_it_and_beyond_the_map_the_distance_is_infinite():
     data = np.zeros((40, 40), np.int8)
     data[20] = 100
     problem = Problem(GridMap(data, 0.25), Vehicle(0.5, 0.2), (1, 9, 0), (9, 1, 0))
-    found = DistanceField.to_goal(problem, ClearanceField(problem.map)).make_bound()
+    found = CostToGo.to_goal(problem, ClearanceField(problem.map)).make_bound()
     places = np.array([(1.0, 9.0), (5.0, 5.1), (-1.0, 1.0), (1.0, 11.0), (1e300, 0.0), (math.nan, 0.0)])
     assert np.isinf(found.at(places)).all()
     assert np.isnan(np.delete(found.headings(places), 1)).all()
@@ -202,7 +202,7 @@ def test_behind_a_wall_and_in_it_and_beyond_the_map_the_distance_is_infinite():
 @pytest.mark.parametrize("goal", [(0.1, 5, 0), (-3, 5, 0), (1e300, -1e300, 0), (10, 10, 0)])
 def test_a_goal_without_room_is_infinitely_far(goal):
     problem = Problem(PolygonMap(shapely.box(0, 0, 10, 10)), Vehicle(0.5, 0.5), (5, 5, 0), goal)
-    found = DistanceField.to_goal(problem, ClearanceField(problem.map)).make_bound()
+    found = CostToGo.to_goal(problem, ClearanceField(problem.map)).make_bound()
     assert found.at(np.array([(5.0, 5.0)]))[0] == math.inf
 
 
@@ -211,18 +211,18 @@ def test_the_bound_is_the_greater_of_the_dubins_curve_and_the_way_around():
     data[40, :70] = 100
     problem = Problem(GridMap(data, 0.125), Vehicle(0.5, 0.2), (1, 4, math.pi / 2), (1, 6, math.pi / 2))
     around = 2 * math.hypot(8.75 - 1, 1)
-    field = DistanceField.to_goal(problem, ClearanceField(problem.map)).make_bound()
+    field = CostToGo.to_goal(problem, ClearanceField(problem.map)).make_bound()
     assert lower_bound(problem, field) == pytest.approx(around, rel=0.04)
     assert lower_bound(problem) == pytest.approx(2)
     backwards = Problem(problem.map, problem.vehicle, (1, 4, 0), (0.9, 4, 0))
     curve = shortest(backwards.start, backwards.goal, 0.5).length
-    assert lower_bound(backwards, DistanceField.to_goal(backwards, ClearanceField(problem.map)).make_bound()) == curve
+    assert lower_bound(backwards, CostToGo.to_goal(backwards, ClearanceField(problem.map)).make_bound()) == curve
 
 
 def test_large_maps_have_large_squares(monkeypatch):
     monkeypatch.setattr(clearance, "MAX_SQUARES", 500)
     map = maze_grid(np.random.default_rng(1))
-    found = DistanceField(ClearanceField(map), 0.0, map.corners().mean(axis=0)).make_bound()
+    found = CostToGo(ClearanceField(map), 0.0, map.corners().mean(axis=0)).make_bound()
     assert found.kernel.side == 0.5
     assert found.kernel.shape == (23, 23)
 
@@ -234,7 +234,7 @@ def test_until_it_is_a_bound_the_distance_is_little_too_long(kind, has_target):
     rng = np.random.default_rng(7)
     map = MAPS[kind](rng)
     points = free_points(rng, map, 0.3, 200)
-    field = DistanceField(ClearanceField(map), 0.25, points[0], target=points[1] if has_target else None)
+    field = CostToGo(ClearanceField(map), 0.25, points[0], target=points[1] if has_target else None)
     found = field.at(points)
     field.prepare_bound()
     np.testing.assert_array_equal(field.at(points), found)
@@ -253,10 +253,10 @@ def test_distances_that_are_found_as_far_as_asked(kind):
     rng = np.random.default_rng(8)
     map = MAPS[kind](rng)
     points = free_points(rng, map, 0.3, 60)
-    whole = DistanceField(ClearanceField(map), 0.25, points[0])
+    whole = CostToGo(ClearanceField(map), 0.25, points[0])
     whole.finish()
     expected = whole.at(points)
-    field = DistanceField(ClearanceField(map), 0.25, points[0], target=points[1])
+    field = CostToGo(ClearanceField(map), 0.25, points[0], target=points[1])
     one_by_one = np.concatenate([field.at(point[None]) for point in points[1:]])
     field.finish()
     for found in one_by_one, field.at(points)[1:]:

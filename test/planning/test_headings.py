@@ -20,8 +20,8 @@ from support.cases import (
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
-from dubins_rrt_ros.planning.search.headings import SPREAD, UNIFORM_SHARE
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
+from dubins_rrt_ros.planning.search.headings import DEVIATION, UNIFORM_SHARE
 from dubins_rrt_ros.planning.search.sampling import Sampler
 
 KINDS = ("uniform", "goal", "field", "mixed")
@@ -29,7 +29,7 @@ KINDS = ("uniform", "goal", "field", "mixed")
 
 def goal_field(map, goal, vehicle, **options):
     problem = Problem(map, vehicle, (*goal, 0.0), (*goal, 0.0), **options)
-    return DistanceField.to_goal(problem, ClearanceField(map))
+    return CostToGo.to_goal(problem, ClearanceField(map))
 
 
 def follow(field, point, goal, steps):
@@ -88,7 +88,7 @@ def walled():
 
 def drawn(problem, count=4000, **options):
     settings, field = Settings(**{"seed": 1, "goal_bias": 0.0, **options}), field_of(problem)
-    return Sampler(problem, settings, field, DistanceField.to_goal(problem, field)).draw(count)
+    return Sampler(problem, settings, field, CostToGo.to_goal(problem, field)).draw(count)
 
 
 @pytest.mark.parametrize("kind", ["field", "mixed"])
@@ -105,13 +105,13 @@ def test_headings_are_uniform_where_the_goal_is_not_reached(kind):
 def test_mixed_headings_are_uniform_by_a_fixed_share_and_else_near_the_field():
     problem = walled()
     poses = drawn(problem, heading_sampling="mixed")
-    led = DistanceField.to_goal(problem, ClearanceField(problem.map)).headings(poses[:, :2])
+    led = CostToGo.to_goal(problem, ClearanceField(problem.map)).headings(poses[:, :2])
     off = np.abs(np.remainder(poses[:, 2] - led + math.pi, math.tau) - math.pi)[np.isfinite(led)]
     assert len(off) > 1500
     opposite = (off > math.pi / 2).mean()
     assert opposite == pytest.approx(UNIFORM_SHARE / 2, abs=0.03)
-    within = (off < SPREAD).mean()
-    assert within == pytest.approx((1 - UNIFORM_SHARE) * math.erf(math.sqrt(0.5)) + UNIFORM_SHARE * SPREAD / math.pi, abs=0.04)
+    within = (off < DEVIATION).mean()
+    assert within == pytest.approx((1 - UNIFORM_SHARE) * math.erf(math.sqrt(0.5)) + UNIFORM_SHARE * DEVIATION / math.pi, abs=0.04)
     assert (np.abs(poses[:, 2]) <= math.pi).all()
 
 

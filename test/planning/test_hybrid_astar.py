@@ -12,7 +12,7 @@ from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, Problem, Sett
 from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar
 from dubins_rrt_ros.planning.curves.dubins import WORDS, shortest
 from dubins_rrt_ros.planning.maps.locate import maps_directory
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.hybrid_astar import FIRST_RUNS, HybridAStarRuns
 
 VEHICLE = Vehicle(0.5, 0.2)
@@ -21,14 +21,14 @@ START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
 
 def runs_on(problem, **options):
     field = field_of(problem)
-    return HybridAStarRuns(problem, Settings(seed=1, **options), field, DistanceField.to_goal(problem, field))
+    return HybridAStarRuns(problem, Settings(seed=1, **options), field, CostToGo.to_goal(problem, field))
 
 
 def first_path(problem, portion=256):
     """The first path, or None, and the runs."""
     runs, expanded = runs_on(problem), 0
     while not runs.exhausted and expanded < scaled(100_000, least=10_000):
-        if found := runs.run(portion, None):
+        if found := runs.run(portion, math.inf):
             return found, runs
         expanded += portion
     return None, runs
@@ -39,7 +39,7 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
     return HybridAStar(checker=field.collision_checker(problem.vehicle), radius=radius, start=problem.start,
-                       goals=np.array([problem.goal]), to_goal=DistanceField.to_goal(problem, field).kernel,
+                       goals=np.array([problem.goal]), to_goal=CostToGo.to_goal(problem, field).kernel,
                        corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=sectors,
                        weight=weight, visit_penalty=visit_penalty, limit=limit, max_expanded=most)
 
@@ -112,11 +112,11 @@ def test_portions_do_not_change_the_path(portion):
 @needs_compiled
 def test_portions_do_not_change_later_paths():
     def later(portion):
-        runs, best, found = runs_on(walled()), None, []
+        runs, best, found = runs_on(walled()), math.inf, []
         for _ in range(60_000 // portion):
             if (path := runs.run(portion, best)) is not None:
                 found.append(path)
-                best = path.length if best is None else best
+                best = path.length if best == math.inf else best
         return [path.waypoints.tobytes() for path in found]
 
     few, many = later(50), later(5)
@@ -221,7 +221,7 @@ def test_a_lattice_of_more_cells_than_memory(side, radius):
     behind = Problem(problem.map, vehicle, (0.3 * side, 0.3 * side, -1000.0), (0.7 * side, 0.3 * side, 1.0))
     runs = runs_on(behind)
     for _ in range(scaled(20)):
-        runs.run(256, None)
+        runs.run(256, math.inf)
 
 
 def test_a_start_in_the_corner_of_the_lattice_with_a_heading_many_turns_below_0():
@@ -234,9 +234,9 @@ def test_a_start_in_the_corner_of_the_lattice_with_a_heading_many_turns_below_0(
 def test_the_distances_that_guide_it_are_not_changed():
     problem = walled()
     field = ClearanceField(problem.map)
-    to_goal = DistanceField.to_goal(problem, field)
+    to_goal = CostToGo.to_goal(problem, field)
     before = to_goal.kernel.nodes().tobytes()
-    HybridAStarRuns(problem, Settings(seed=1), field, to_goal).run(2000, None)
+    HybridAStarRuns(problem, Settings(seed=1), field, to_goal).run(2000, math.inf)
     assert to_goal.kernel.nodes().tobytes() == before
 
 

@@ -25,7 +25,7 @@ from dubins_rrt_ros.planning import (
     plan,
 )
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.search.smoothing import polished
+from dubins_rrt_ros.planning.search.smoothing import smooth
 
 PLAIN = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 KINDS = {"rrt": {"planner": "rrt"}, "rrt_star": {"planner": "rrt_star"},
@@ -54,8 +54,7 @@ def test_shortest_curves_and_their_pieces_hold(start, goal, radius):
 def test_tree_and_path_hold_after_every_step(kind, seed):
     problem = a_problem(seed)
     search = search_on(problem, Settings(samples=scaled(800, least=60), seed=seed, **KINDS[kind]))
-    while not search.done:
-        search.grow()
+    for _ in search.run():
         tree, path = search.tree, search.path
         tree.check()
         if path is not None:
@@ -99,12 +98,12 @@ def test_cancelled_answers_hold(asked):
 
 
 @pytest.mark.parametrize("seed", range(PROBLEMS))
-def test_polished_paths_hold(seed):
+def test_smoothed_paths_hold(seed):
     rng = np.random.default_rng(seed)
     field = ClearanceField(empty_map(40.0))
     path = path_over([random_pose(rng) for _ in range(5)], VEHICLE.turning_radius)
-    for fresh in (True, False):
-        path = polished(path, VEHICLE, field, rng, fresh)
+    for first_round in (True, False):
+        path = smooth(path, VEHICLE, field, rng, first_round)
         path.check()
 
 

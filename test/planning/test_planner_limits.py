@@ -8,7 +8,7 @@ from support.cases import SCALE, empty_map
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit_path, plan, prepare
-from dubins_rrt_ros.planning.search.smoothing import polished
+from dubins_rrt_ros.planning.search.smoothing import smooth
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -59,19 +59,19 @@ def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
     assert again.path == result.path
 
 
-def test_the_time_to_the_first_path_is_without_its_polishing(planner, monkeypatch):
-    def slowly(*arguments):
+def test_the_time_to_the_first_path_is_without_its_smoothing(planner, monkeypatch):
+    def slowly(*arguments, **options):
         time.sleep(0.05)
-        return polished(*arguments)
+        return smooth(*arguments, **options)
 
-    monkeypatch.setattr("dubins_rrt_ros.planning.search.rrt.polished", slowly)
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.smoothing.smooth", slowly)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, samples=200, goal_bias=0.5))
     assert 0 < result.time_to_first < result.planning_time - 0.05
 
 
 @pytest.mark.parametrize("informed", [False, True])
 def test_a_cancellation_waits_for_no_more_than_a_step(planner, informed):
-    """Each step takes some milliseconds, whether it expands poses, polishes a path or draws samples."""
+    """Each step takes some milliseconds, whether it expands poses, smooths a path or draws samples."""
     times = []
 
     def cancel():

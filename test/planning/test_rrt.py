@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from support.cases import SCALE, boxes_grid, contents, empty_map, field_of, needs_compiled, scaled, search_on
+from support.cases import SCALE, boxes_grid, contents, empty_map, field_of, finish, needs_compiled, scaled, search_on
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map
 from dubins_rrt_ros.planning.curves.dubins import shortest
 from dubins_rrt_ros.planning.maps.locate import maps_directory
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.rrt import BLOCK, Search
 from dubins_rrt_ros.planning.search.sampling import Sampler
 
@@ -24,8 +24,7 @@ def maze():
 def searched(problem, **options):
     """A finished search, of the plain algorithm unless the options say otherwise, with the best length after every batch."""
     search, lengths = search_on(problem, Settings(**{"seed": 1, "samples": scaled(1500), **PLAIN, **options})), []
-    while not search.done:
-        search.grow()
+    for _ in search.run():
         lengths.append(math.inf if search.length is None else search.length)
     return search, lengths
 
@@ -75,9 +74,7 @@ def test_the_plain_algorithm_needs_no_distances_to_the_goal(planner, maze):
     """What a search is given beyond field and settings changes nothing."""
     settings = Settings(planner=planner, seed=1, samples=scaled(1500), **PLAIN)
     without = Search(maze, settings, field_of(maze), None)
-    while not without.done:
-        without.grow()
-    assert contents(without) == contents(searched(maze, planner=planner)[0])
+    assert contents(finish(without)) == contents(searched(maze, planner=planner)[0])
 
 
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
@@ -90,7 +87,7 @@ def test_the_best_path_of_the_plain_algorithm_is_the_tree_s(planner, maze):
         assert search.length == search.path.length
 
 
-def test_rrt_polishes_its_one_path():
+def test_rrt_smooths_its_one_path():
     """Its samples, and so its path, are those of the plain algorithm until then."""
     plain, _ = searched(open_field(), planner="rrt")
     search, lengths = searched(open_field(), planner="rrt", shortcut=True)
@@ -140,7 +137,7 @@ def test_without_a_step_size_edges_are_long():
 
 def drawn(problem, count=2000, **options):
     field = field_of(problem)
-    return Sampler(problem, Settings(seed=1, **{**PLAIN, **options}), field, DistanceField.to_goal(problem, field)).draw(count)
+    return Sampler(problem, Settings(seed=1, **{**PLAIN, **options}), field, CostToGo.to_goal(problem, field)).draw(count)
 
 
 def test_samples_are_uniform():

@@ -8,7 +8,7 @@ from support.cases import SCALE, boxes_grid, empty_map, field_of, holed_polygons
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle
 from dubins_rrt_ros.planning.search import rrt, sampling
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.sampling import Sampler
 
 START, GOAL = (-4.0, -3.0, 0.0), (4.0, 3.0, 1.0)
@@ -25,8 +25,8 @@ class Drawing:
 
     def __init__(self, problem, **options):
         field = field_of(problem)
-        self.problem, self.to_goal = problem, DistanceField.to_goal(problem, field).make_bound()
-        self.from_start = DistanceField.from_start(problem, field).make_bound()
+        self.problem, self.to_goal = problem, CostToGo.to_goal(problem, field).make_bound()
+        self.from_start = CostToGo.from_start(problem, field).make_bound()
         self.sampler = Sampler(problem, Settings(**{"seed": 1, "goal_bias": 0.0, **options}), field, self.to_goal)
 
     def plain(self, count=2000):
@@ -162,13 +162,12 @@ def test_nodes_are_added_only_where_a_path_shorter_than_the_best_may_lead(shortc
     problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), VEHICLE, START, GOAL)
     drawing = Drawing(problem)
     search = search_on(problem, Settings(samples=scaled(4 * rrt.BLOCK, least=2 * rrt.BLOCK), seed=1, shortcut=shortcut))
-    begun = []
-    while not search.done:
+    at_blocks = []
+    for _ in search.run():
         if search.samples % rrt.BLOCK == 0 and search.length is not None:
-            begun.append((search.size, search.length))
-        search.grow()
-    assert begun
+            at_blocks.append((search.size, search.length))
+    assert at_blocks
     nodes = search.tree.poses
-    for size, length in begun:
-        # Of a path that was adopted the nodes lie below its own length.
+    for size, length in at_blocks:
+        # Of a path that was inserted the nodes lie below its own length.
         assert drawing.bound(nodes[size:]).max(initial=0) <= length + 1e-9

@@ -1,5 +1,6 @@
 """Searches with all that goes beyond the paper: bytes by seed and samples alone, never a longer path, none lost by pruning."""
 
+import itertools
 import math
 
 import numpy as np
@@ -22,9 +23,8 @@ from support.cases import (
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
-from dubins_rrt_ros.planning.search import background as beside
-from dubins_rrt_ros.planning.search import rrt
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search import background, rrt
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 BUDGETS = (1, 7, rrt.BLOCK - 1, rrt.BLOCK, rrt.BLOCK + 1, 1100, 3000) if SCALE == 1 else (1, 7, 20, 40)
@@ -64,7 +64,7 @@ def test_a_seed_determines_every_byte(planner, problem, monkeypatch):
     assert contents(searched(problem, planner=planner)) == contents(once)
     for batch_time, cores in ((1e-9, 2), (1.0, 2), (0.005, 1), (0.005, 2))[:scaled(4, least=2)]:
         monkeypatch.setattr(rrt, "BATCH_TIME", batch_time)
-        monkeypatch.setattr(beside, "cores", lambda cores=cores: cores)
+        monkeypatch.setattr(background, "cores", lambda cores=cores: cores)
         other = searched(problem, planner=planner)
         assert contents(other) == contents(once)
         assert (other.best, other.samples) == (once.best, once.samples)
@@ -80,26 +80,25 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one(problem, options, mon
     """So a plan that was cut short can be had again with the samples that it took; and more of them never give a longer path."""
     monkeypatch.setattr(rrt, "BATCH_TIME", 1e-9)  # batches of one sample, but for the first, of eight
     whole, lengths = search_on(problem, Settings(samples=BUDGETS[-1], seed=1, **options)), []
+    steps, may_end = whole.run(), True
     for budget in BUDGETS:
         part = searched(problem, samples=budget, **options)
         assert part.samples <= budget
         lengths.append(math.inf if part.length is None else part.length)
-        while whole.samples < part.samples or whole.best < 0 <= part.best or not whole.may_end:
-            whole.grow()
+        while whole.samples < part.samples or whole.best < 0 <= part.best or not may_end:
+            may_end = next(steps)
         if part.samples not in (1, 7):
             assert (whole.samples, contents(whole)) == (part.samples, contents(part))
     assert lengths == sorted(lengths, reverse=True)
 
 
 @needs_compiled
-def test_the_first_path_is_polished_and_another_sought_before_the_first_sample(problems):
+def test_the_first_path_is_smoothed_and_another_sought_before_the_first_sample(problems):
     search = search_on(problems["maze"], Settings(samples=1000, seed=1))
-    lengths, growths = [], 0
-    while search.samples == 0:
-        search.grow()
-        lengths += [search.length] if search.best >= 0 else []
-        growths += 1
-    assert growths < 20
+    before = itertools.takewhile(lambda _: search.samples == 0, search.run())
+    costs = [search.cost for _ in before]
+    assert len(costs) < 20
+    lengths = [cost for cost in costs if cost < math.inf]
     assert lengths[-1] < 0.99 * lengths[0]
     assert lengths == sorted(lengths, reverse=True)
 
@@ -114,8 +113,7 @@ def test_the_best_path_on_random_problems(seed):
         return
     step, best = float(rng.choice([0.0, 0.5])), math.inf
     search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step))
-    while not search.done:
-        search.grow()
+    for _ in search.run():
         if search.best >= 0:
             assert search.length <= best
             best = search.length
@@ -133,7 +131,7 @@ def test_the_best_path_on_random_problems(seed):
         assert search.length <= tree.costs[reaching].min() + 1e-9
         assert search.path == tree.path_to(search.best)
         assert audit_path(search.path, problem).ok
-        bound = lower_bound(problem, DistanceField.to_goal(problem, field_of(problem)).make_bound())
+        bound = lower_bound(problem, CostToGo.to_goal(problem, field_of(problem)).make_bound())
         assert search.length >= bound - 1e-9
 
 
@@ -159,12 +157,12 @@ def test_what_is_left_out_would_not_have_helped():
 @pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
-    """While the bounds are still computed beside it."""
+    """While the bounds are still computed in the background."""
     side = 700 if SCALE == 1 else 60
     data = np.zeros((side, side))
     data[side // 4:side // 2:side // 8, side // 10:-side // 10] = 100
     problem = Problem(GridMap(data, 0.1), VEHICLE, (0.05 * side, 0.01 * side, 0.0), (0.09 * side, 0.09 * side, 1.0))
-    expected = lower_bound(problem, DistanceField.to_goal(problem, field_of(problem)).make_bound())
+    expected = lower_bound(problem, CostToGo.to_goal(problem, field_of(problem)).make_bound())
     for seed in range(scaled(15, least=2)):
         result = plan(problem, Settings(planner=planner, samples=1, seed=seed, planning_time=60.0))
         assert result.status == Status.NONE
@@ -230,7 +228,7 @@ def test_a_narrow_street_is_solved_by_every_seed():
 
 
 @pytest.mark.parametrize("step", [0.0, 0.7])
-def test_the_tree_holds_the_path_that_polishing_made(step, problems):
+def test_the_tree_holds_the_smoothed_path(step, problems):
     """In edges no longer than the step; and the start is where it was."""
     problem = problems["maze"]
     search = searched(problem, step_size=step, samples=1)

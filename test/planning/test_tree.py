@@ -41,8 +41,7 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
         field = ClearanceField(problem.map)
         settings = Settings(planner=planner, samples=scaled(1200, least=100), step_size=step_size, seed=seed, **options)
         search = search_on(problem, settings)
-        while not search.done:
-            search.grow()
+        for _ in search.run():
             tree = search.tree
             tree.check(field, VEHICLE)
             assert len(tree) == search.size

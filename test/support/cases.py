@@ -12,7 +12,7 @@ import shapely
 
 from dubins_rrt_ros.planning import GridMap, Path, PolygonMap, Problem, Vehicle, World, _kernels, kernels_compiled
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.rrt import Search
 from support import naive
 
@@ -135,13 +135,13 @@ def field_of(problem):
 def search_on(problem, settings):
     """A search that has not begun."""
     field = field_of(problem)
-    return Search(problem, settings, field, DistanceField.to_goal(problem, field))
+    return Search(problem, settings, field, CostToGo.to_goal(problem, field))
 
 
 def finish(search):
     """The search, when it is done."""
-    while not search.done:
-        search.grow()
+    for _ in search.run():
+        pass
     return search
 
 

@@ -31,7 +31,7 @@ from dubins_rrt_ros.cli.common.plots import (
     planner_title,
 )
 from dubins_rrt_ros.planning import ClearanceField, Plan, Problem, Progress, Settings, plan
-from dubins_rrt_ros.planning.search.cost_to_go import DistanceField
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
 from ..paper.runs import MAZE, MOST, NO_LIMIT, UNLIMITED, Run, planned, problem_in
@@ -68,8 +68,8 @@ class Bounds(NamedTuple):
         least: no path is shorter [m].
     """
 
-    to_goal: DistanceField
-    from_start: DistanceField
+    to_goal: CostToGo
+    from_start: CostToGo
     least: float
 
     def over(self, points: np.ndarray) -> np.ndarray:
@@ -175,7 +175,7 @@ def first_and_final() -> tuple[Plan, Plan]:
 def bounds_of(problem: Problem) -> Bounds:
     """The bounds of a problem, of known space alone."""
     field = ClearanceField(problem.map)
-    to_goal, from_start = (make(problem, field).make_bound() for make in (DistanceField.to_goal, DistanceField.from_start))
+    to_goal, from_start = (make(problem, field).make_bound() for make in (CostToGo.to_goal, CostToGo.from_start))
     return Bounds(to_goal, from_start, lower_bound(problem, to_goal))
 
 

@@ -1,16 +1,21 @@
 """Angles, and differences between poses."""
 
 import math
-from typing import TypeVar
+from typing import overload
 
 import numpy as np
 
-Angles = TypeVar("Angles", float, np.ndarray)
+
+@overload
+def wrap(angle: float) -> float: ...
+@overload
+def wrap(angle: np.ndarray) -> np.ndarray: ...
 
 
-def wrap(angle: Angles) -> Angles:
+def wrap(angle: float | np.ndarray) -> float | np.ndarray:
     """Return angles [rad] as those in [-pi, pi) that point the same way."""
-    return np.remainder(angle + math.pi, math.tau) - math.pi
+    wrapped: float | np.ndarray = np.remainder(angle + math.pi, math.tau) - math.pi
+    return wrapped
 
 
 def position_error(pose: tuple[float, float, float], other: tuple[float, float, float]) -> float:

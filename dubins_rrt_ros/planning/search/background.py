@@ -1,34 +1,46 @@
-"""A second core, where there is one: work beside the search, whose answer does not depend on when or where it was computed."""
+"""Work in the background, whose results do not depend on when or where they were computed."""
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import Any, TypeVar
+from typing import ParamSpec, TypeVar
 
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
+Parameters = ParamSpec("Parameters")
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Beside:
-    """Computes one thing after the other beside its caller. What is computed must not touch what the caller works on.
+class BackgroundExecutor:
+    """Runs jobs on the cores beside the caller's; who waits for a job that has not started runs it himself.
 
-    The kernels hold no lock, so that both make progress. With one core nothing is computed before it is asked for.
+    So no job waits for another, and any number of requests can share one executor. With a single core every job is run by who
+    asks for its result. A job must not change what its caller works on; kernels release the interpreter's lock.
     """
 
-    def __init__(self):
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="dubins_rrt_beside") if cores() > 1 else None
+    def __init__(self) -> None:
+        self._pool: ThreadPoolExecutor | None = None
 
-    def start(self, function: Callable[..., Answer], *arguments: Any) -> Callable[[], Answer]:
-        """Compute `function(*arguments)` when what was begun before is done; what is returned gives its answer.
+    def start(self, function: Callable[Parameters, Result], *args: Parameters.args, **kwargs: Parameters.kwargs
+              ) -> Callable[[], Result]:
+        """Start `function(*args, **kwargs)`, and return a function that waits for the result and returns it each time."""
+        if cores() == 1:
+            return cache(lambda: function(*args, **kwargs))
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="dubins_rrt_background")
+        future = self._pool.submit(function, *args, **kwargs)
+        return cache(lambda: function(*args, **kwargs) if future.cancel() else future.result())
 
-        Where that is asked for before the computation has begun, the caller does it at once.
-        """
-        if not self._pool:
-            return cache(lambda: function(*arguments))
-        future = self._pool.submit(function, *arguments)
-        return cache(lambda: function(*arguments) if future.cancel() else future.result())
+    def forget_threads(self) -> None:
+        """Start new threads for the next jobs, as a forked process must: it has none of its parent's."""
+        self._pool = None
+
+
+#: The executor of this process.
+BACKGROUND = BackgroundExecutor()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=BACKGROUND.forget_threads)

@@ -1,4 +1,4 @@
-"""The headings of random poses: any, towards the goal, or along the way around obstacles to the goal."""
+"""Headings of random poses: any, towards the goal, or along the way around obstacles to the goal."""
 
 import math
 
@@ -7,14 +7,14 @@ import numpy as np
 from ..curves.angles import wrap
 from ..problem import Problem
 from ..settings import Settings
-from .cost_to_go import DistanceField
+from .cost_to_go import CostToGo
 
-#: Mixed headings: the share of uniform ones, and the standard deviation of the others about the field [rad].
+#: Share of uniform headings among mixed ones, and standard deviation of the others about the cost-to-go's [rad].
 UNIFORM_SHARE = 0.2
-SPREAD = math.radians(20)
+DEVIATION = math.radians(20)
 
-#: The kinds of headings that need the distances to the goal.
-FOLLOW_FIELD = ("field", "mixed")
+#: Kinds of headings that need the cost-to-go.
+FOLLOW_COST_TO_GO = ("field", "mixed")
 
 
 class Headings:
@@ -24,22 +24,22 @@ class Headings:
     uniform. `goal` and `field` do not: they have one heading for a position, and the best path may need another.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, to_goal: DistanceField | None):
-        """`to_goal` is needed for `field` and `mixed`."""
+    def __init__(self, problem: Problem, settings: Settings, to_goal: CostToGo | None):
+        """Prepare the draws; `to_goal` is needed for `field` and `mixed`."""
         self._kind = settings.heading_sampling
         self._goal = np.array(problem.goal[:2])
-        self._field = to_goal if self._kind in FOLLOW_FIELD else None
+        self._to_goal = to_goal if self._kind in FOLLOW_COST_TO_GO else None
 
     def draw(self, positions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """(n,) headings [rad] for (n, 2) positions [m]; uniform ones where the field has none."""
+        """Return (n,) headings [rad] for (n, 2) positions [m]; uniform ones where the cost-to-go leads nowhere."""
         if self._kind == "goal":
             towards = self._goal - positions
-            return np.arctan2(towards[:, 1], towards[:, 0])
+            return np.asarray(np.arctan2(towards[:, 1], towards[:, 0]))
         uniform = rng.uniform(-math.pi, math.pi, len(positions))
-        if self._field is None:
+        if self._to_goal is None:
             return uniform
-        led = self._field.headings(positions)
+        downhill = self._to_goal.headings(positions)
         if self._kind == "mixed":
-            led += rng.normal(0, SPREAD, len(positions))
-            led[rng.random(len(positions)) < UNIFORM_SHARE] = math.nan
-        return np.where(np.isnan(led), uniform, wrap(led))
+            downhill += rng.normal(0, DEVIATION, len(positions))
+            downhill[rng.random(len(positions)) < UNIFORM_SHARE] = math.nan
+        return np.where(np.isnan(downhill), uniform, wrap(downhill))

@@ -3,11 +3,11 @@
     all_links = [start]
     while N != n_iter:
         draw a random pose, sometimes the goal               Sampler.draw
-        find the closest link                                Grower.steer
-        steer along the Dubins curve towards the pose        Grower.steer
-        unless it collides, add it                           Grower.extend
-        RRT*: by the cheapest of the near links ...          Grower.choose_parent
-              ... and reroute those that gain by it          Grower.rewire
+        find the closest link                                RrtKernel.steer
+        steer along the Dubins curve towards the pose        RrtKernel.steer
+        unless it collides, add it                           RrtKernel.extend
+        RRT*: by the cheapest of the near links ...          RrtKernel.choose_parent
+              ... and reroute those that gain by it          RrtKernel.rewire
 
 The closest link is the one with the shortest Dubins curve to the pose. Near are the e (1 + 1/3) log n links with the shortest
 curves to it (the k-nearest RRT* of Karaman and Frazzoli, 2011, for three dimensions), and all within the longest of these
@@ -16,18 +16,18 @@ curves' length from it.
 What goes beyond the paper, and is left out where the settings say so, happens before the first sample and after each block:
 
     informed   hybrid A* finds a first path, and others later     HybridAStarRuns.run
-               only what can still be on a shorter path is drawn,
-               and added; what cannot be any more is forgotten    Grower.beat, Search._aim_below_best
-    shortcut   the best path is made shorter by trial             polished
-    both       and added to the tree, which goes on from there    Grower.adopt
+               only what can still be on a cheaper path is        RrtKernel.set_cost_bound
+               drawn, and added; other nodes are forgotten        SearchTree.prune_index
+    shortcut   the best path is smoothed                          Smoother.smooth
+    both       and added to the tree, which goes on from there    RrtKernel.insert_path
 
-The lower bounds, and the later runs of hybrid A*, are computed beside the samples. Where their answers are taken is fixed by the
-samples alone, so that the path does not depend on the time nor on the number of cores.
+The lower bounds, and the later runs of hybrid A*, are computed in the background of the samples. Where their results are taken is
+fixed by the samples alone, so that the path depends neither on the time nor on the number of cores.
 """
 
 import math
 import time
-from functools import cached_property
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
@@ -38,78 +38,62 @@ from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..problem import Problem
 from ..settings import Settings
-from .background import Beside
-from .cost_to_go import DistanceField
+from .cost import path_cost
+from .cost_bounds import CostBounds
+from .cost_to_go import CostToGo
 from .hybrid_astar import HybridAStarRuns
 from .sampling import Sampler
-from .smoothing import polished
+from .smoothing import Smoother
 from .tree import Tree, path_to
 
 NEAR_FACTOR = math.e * (1 + 1 / 3)
 MOST_NEAR = 512
-#: Samples are drawn in blocks of this size, however many are used: the draws depend neither on the time nor on the budget.
+#: Number of samples in a block. Blocks are drawn whole, so that the draws depend neither on the time nor on the budget.
 BLOCK = 512
-#: About how long a batch takes [s]: so long does a cancellation wait.
-BATCH_TIME = 0.005
-#: How many poses hybrid A* expands at a time before the first sample: at most so many for a first path, so many for a better one.
+#: Number of samples in the first batch, and time that a batch is to take [s]: a cancellation waits for its end.
+FIRST_BATCH, BATCH_TIME = 8, 0.005
+#: Number of poses that hybrid A* expands in one step before the first sample, and their maximum numbers for a first path and
+#: for a better one.
 EXPANSIONS, MOST_FIRST, MOST_SECOND = (256, 32_768, 4096) if COMPILED else (32, 512, 128)
-#: After a block the search waits for so many poses at most that it expanded beside it: for a disc, and for a polygon, which takes
-#: several times as long.
-EXPANSIONS_BESIDE, EXPANSIONS_BESIDE_OF_POLYGON = 1024, 128
-#: How often a new path is polished, and what gain of the last time is reason for another, as a share of its length.
-POLISHINGS, WORTH_MORE = 3, 1e-4
-#: Nodes are forgotten when the best path became shorter by this share of its length.
-LEAST_FALL = 1e-4
+#: Number of poses that hybrid A* expands in the background of a block: for a disc, and for a polygon, which takes several times
+#: as long. The search waits for them at the end of the block.
+BACKGROUND_EXPANSIONS, BACKGROUND_EXPANSIONS_OF_POLYGON = 1024, 128
+#: Number of rounds of smoothing for the first path.
+ROUNDS = 3
 
 
 class Search:
     """A search under way. Its state after a sample is a function of problem, seed and settings but for budget and time.
 
     Attributes:
-        samples: how many samples were used so far.
+        samples: number of samples used so far.
         best: the node that reaches the goal at the least cost, or -1.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: DistanceField | None):
-        """`to_goal` is needed with `informed`, and with headings along the field."""
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None):
+        """Prepare a search; `to_goal` is needed with `informed`, and with headings along the cost-to-go."""
         corners = problem.map.corners()
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
-        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
-        self._grower = RrtKernel(
-            tree=self._tree, checker=field.collision_checker(vehicle), step=settings.step_size, near_factor=NEAR_FACTOR,
-            max_near=MOST_NEAR, goal=problem.goal, tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
-        self._grow = self._grower.rrt if settings.planner == "rrt" else self._grower.rrt_star
-        self._problem, self._settings, self._field, self._to_goal = problem, settings, field, to_goal
-        self._beside = Beside()
-        self._runs = self._portion = self._bound_to_goal = self._bound_from_start = None
-        if settings.informed:
-            self._runs = HybridAStarRuns(problem, settings, field, to_goal)
-        self._from_start: DistanceField | None = None
-        self._block = np.empty((0, 3))
-        self._used = 0
-        self._batch = 8
-        self._expansions = MOST_FIRST if settings.informed else 0  # due before the first sample
-        self._polishings = 0  # due before the next sample
-        self._is_polished = False  # whether it seems not to be worth more
-        self._is_news = False  # whether the best path changed, as far as that may count for the next sample
-        self._seen = self._forgot_above = math.inf
         self.samples = 0
         self.best = -1
-
-    # Neither is needed for the first path of hybrid A*, which need not wait for them.
-    @cached_property
-    def _sampler(self) -> Sampler:
-        return Sampler(self._problem, self._settings, self._field, self._to_goal)
-
-    @cached_property
-    def _rng(self) -> np.random.Generator:
-        return np.random.default_rng((self._settings.seed, 2))  # apart from that of the samples
+        self._problem, self._settings = problem, settings
+        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
+        self._kernel = RrtKernel(
+            tree=self._tree, checker=field.collision_checker(vehicle), step=settings.step_size, near_factor=NEAR_FACTOR,
+            max_near=MOST_NEAR, goal=problem.goal, tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
+        self._runs: HybridAStarRuns | None = None
+        self._bounds: CostBounds | None = None
+        if settings.informed and to_goal:
+            self._runs = HybridAStarRuns(problem, settings, field, to_goal)
+            self._bounds = CostBounds(problem, field, to_goal)
+        self._sampler = Sampler(problem, settings, field, to_goal)
+        self._smoother = Smoother(vehicle, field, settings.seed)
 
     @property
     def size(self) -> int:
-        """How many nodes the tree has."""
-        return self._tree.size
+        """The number of nodes of the tree."""
+        return int(self._tree.size)
 
     @property
     def tree(self) -> Tree:
@@ -117,157 +101,170 @@ class Search:
         return Tree.copy_of(self._tree)
 
     @property
-    def length(self) -> float | None:
-        """Of the best path so far [m], or None."""
-        return self._tree.costs[self.best] if self.best >= 0 else None
-
-    @property
     def path(self) -> Path | None:
         """The best path so far, or None; the tree is not copied for it."""
         return path_to(self.best, self._tree) if self.best >= 0 else None
 
     @property
-    def done(self) -> bool:
-        """Whether the budget is used, or RRT has its path."""
-        used = self.samples == self._settings.samples or (self.best >= 0 and self._settings.planner == "rrt")
-        return used and self.may_end
+    def cost(self) -> float:
+        """The cost of the best path so far [m]; infinite where there is none."""
+        return float(self._tree.costs[self.best]) if self.best >= 0 else math.inf
 
     @property
-    def may_end(self) -> bool:
-        """Whether the same search with the samples so far as its budget would end here."""
-        if self.best < 0:
-            return True
-        return self._polishings == 0 and (self.samples > 0 or self._settings.planner == "rrt")
+    def length(self) -> float | None:
+        """The length of the best path so far [m], or None."""
+        path = self.path
+        return path.length if path else None
 
-    def grow(self) -> None:
-        """Take one step of a few milliseconds: a portion of hybrid A*, a polishing, or a batch of samples, which ends early with
-        the first path."""
-        if self._runs and (self.best >= 0 or self._expansions == 0):
-            self._begin_bounds()
-        if self._polishings == POLISHINGS or (self._polishings > 0 and self._expansions == 0):
-            self._polish()
-        elif self._expansions > 0:
-            self._run_hybrid_astar()
-        else:
-            self._draw_batch()
+    @property
+    def done(self) -> bool:
+        """True if the budget is used, or RRT has its path."""
+        return self.samples == self._settings.samples or (self.best >= 0 and self._is_rrt)
 
-    def make_bound(self) -> DistanceField:
-        """Make the distances to the goal, which `informed` needs, lower bounds, when nothing beside the search works on them."""
-        self._begin_bounds()
-        self._bound_to_goal()
-        if self._portion:
-            self._portion()
-        return self._to_goal.make_bound()
+    @property
+    def _is_rrt(self) -> bool:
+        return self._settings.planner == "rrt"
 
-    def _run_hybrid_astar(self) -> None:
-        """Run it up to a first path, and then once more for a better one."""
-        had_none = self.best < 0
-        portion = min(EXPANSIONS, self._expansions)
-        self._expansions -= portion
-        self._take(self._runs.run(portion, self.length))
-        if self._runs.exhausted or (self._runs.between_runs and not had_none):
-            self._expansions = 0
-        if had_none and self.best >= 0:
-            self._expansions = MOST_SECOND if self._settings.planner == "rrt_star" else 0
+    def run(self) -> Iterator[bool]:
+        """Search, in steps of a few milliseconds each.
 
-    def _begin_bounds(self) -> None:
-        """Begin to compute the lower bounds beside the search, once; not earlier, as that would keep the first path waiting."""
-        if self._bound_to_goal:
-            return
-        if self.best < 0:
-            self._to_goal.finish()  # hybrid A* goes on beside the samples
-        problem, field = self._problem, self._field
-        self._bound_to_goal = self._beside.start(self._to_goal.prepare_bound)
-        if self._settings.planner == "rrt_star":
-            self._bound_from_start = self._beside.start(lambda: DistanceField.from_start(problem, field).make_bound())
+        Yields:
+            True if the search may be ended here: with the samples so far as its budget it would have come to the same end.
+        """
+        if self._runs:
+            yield from self._find_first_path(self._runs)
+            self._start_bounds()
+            if self.best >= 0:
+                yield from self._improve_first_path(self._runs)
+        batch = FIRST_BATCH
+        while not self.done:
+            batch = yield from self._take_block(batch)
 
-    def _take(self, found: Path | None) -> None:
-        """Add a path that hybrid A* found to the tree, if it is the best."""
-        if found is not None and (self.best < 0 or found.length < self.length):
-            self._adopt(found)
+    def make_bound(self) -> CostToGo | None:
+        """Make the cost-to-go a lower bound, and return it; None unless the search is informed. It then waits for hybrid A*."""
+        if not self._bounds:
+            return None
+        if self._runs:
+            self._runs.wait()
+        return self._bounds.make_to_goal()
 
-    def _polish(self) -> None:
-        fresh = self._polishings == POLISHINGS
-        self._polishings -= 1
-        before = self.length
-        shorter = self._polished(self.path, fresh)
-        if shorter.length < before:
-            self._adopt(shorter, self.best)
-        self._is_polished = before - self.length <= WORTH_MORE * before
+    def _may_end(self, smoothing_is_due: bool = False) -> bool:
+        return self.best < 0 or (not smoothing_is_due and (self.samples > 0 or self._is_rrt))
 
-    def _draw_batch(self) -> None:
-        if self._is_news and self._settings.informed and self.best >= 0:
-            self._aim_below_best()
-        self._is_news = False
-        if self._used == len(self._block):
-            self._block = self._sampler.draw(BLOCK, self._from_start, self.path)
-            self._used = 0
-        left = self._settings.samples - self.samples
-        begin, end = self._used, min(self._used + min(self._batch, left), len(self._block))
-        self._grower.reserve(end - begin)
+    def _find_first_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
+        """Run hybrid A* up to a first path, as far as that is found soon."""
+        left = MOST_FIRST
+        while left > 0 and self.best < 0 and not runs.exhausted:
+            expansions = min(EXPANSIONS, left)
+            left -= expansions
+            self._insert_if_better(runs.run(expansions, math.inf))
+            yield self._may_end(smoothing_is_due=self._settings.shortcut)
+
+    def _improve_first_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
+        """Smooth the first path, look once for a better one where RRT* goes on, and smooth the best."""
+        rounds = range(ROUNDS if self._settings.shortcut else 0)
+        yield from self._smooth(rounds[:1])
+        if not self._is_rrt:
+            yield from self._find_better_path(runs)
+        yield from self._smooth(rounds[1:])
+
+    def _find_better_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
+        """Run hybrid A* once more, as far as its run ends soon."""
+        left = MOST_SECOND
+        while left > 0:
+            expansions = min(EXPANSIONS, left)
+            left = 0 if self._run_ended(runs, expansions) else left - expansions
+            yield self._may_end()
+
+    def _run_ended(self, runs: HybridAStarRuns, expansions: int) -> bool:
+        self._insert_if_better(runs.run(expansions, self.cost))
+        return runs.between_runs or runs.exhausted
+
+    def _start_bounds(self) -> None:
+        """Start to compute lower bounds in the background; not earlier, as the first path would have to wait for them."""
+        if self._bounds:
+            if self.best < 0:
+                self._bounds.to_goal.finish()  # hybrid A* goes on in the background of the samples, and asks for it too
+            self._bounds.start(from_start=not self._is_rrt)
+
+    def _take_block(self, batch: int) -> Generator[bool, None, int]:
+        """Draw a block of samples and take it, batch by batch; return the size of the next batch."""
+        is_limited = self._limit_to_best()
+        block = self._sampler.draw(BLOCK, self._bounds.from_start if self._bounds else None, self.path)
+        used = 0
+        while used < BLOCK and not self.done:
+            is_limited = is_limited or self._limit_to_best()
+            had_path = self.best >= 0
+            used, batch = self._take_batch(block, used, batch)
+            if used == BLOCK:
+                self._end_block()
+            rounds = self._rounds_due(had_path, used == BLOCK)
+            yield self._may_end(smoothing_is_due=bool(rounds))
+            yield from self._smooth(rounds)
+        return batch
+
+    def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
+        """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
+        end = min(begin + min(size, self._settings.samples - self.samples), BLOCK)
+        self._kernel.reserve(end - begin)
         started = time.perf_counter()
-        self._used = self._grow(self._block, begin, end)
-        took = time.perf_counter() - started
-        grown = self._used - begin
-        self.samples += grown
-        self._batch = min(max(1, int(BATCH_TIME * grown / max(took, 1e-6))), 2 * self._batch, BLOCK)
-        if self.best < 0:
-            self._look_for_best()
-        else:
-            self.best = self._grower.best_goal_node()  # that counts for the samples from the next block on
-        if self._used == len(self._block):
-            self._end_block()
+        next_one = (self._kernel.rrt if self._is_rrt else self._kernel.rrt_star)(block, begin, end)
+        took, taken = time.perf_counter() - started, next_one - begin
+        self.samples += taken
+        self.best = self._kernel.best_goal_node()
+        return next_one, min(max(1, int(BATCH_TIME * taken / max(took, 1e-6))), 2 * size, BLOCK)
 
     def _end_block(self) -> None:
-        """Take what was computed beside the last block, and begin what is due after it."""
+        """Take what hybrid A* found in the background, and let it go on."""
         self._tree.rehash()
-        self._look_for_best()
-        if self._runs:
-            self._take_portion()
-        self._is_news = True
-        if self._settings.shortcut and self.best >= 0 and not self._is_polished:
-            self._polishings = max(self._polishings, 1)
-
-    def _take_portion(self) -> None:
-        """Take what hybrid A* found beside the search, and let it go on."""
-        if self._portion:
-            self._take(self._portion())
-            self._portion = None
-        if not self._runs.exhausted:
-            expansions = EXPANSIONS_BESIDE_OF_POLYGON if self._problem.vehicle.footprint else EXPANSIONS_BESIDE
-            self._portion = self._beside.start(self._runs.run, expansions, self.length)
-
-    def _adopt(self, path: Path, end: int = -1) -> None:
-        """Add a path to the tree; `end` is the node at its end, if the tree has it."""
-        if end < 0 and self.best >= 0 and self._problem.exact_goal:
-            end = self.best
-        pieces = path.cut(self._settings.step_size)
-        self._grower.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
-        self._look_for_best()
-
-    def _look_for_best(self) -> None:
-        """Ask the tree for its best path, and let a first one be polished."""
-        had_none = self.best < 0
-        self.best = self._grower.best_goal_node()
-        if self.best < 0 or self.length >= self._seen:
+        if not self._runs:
             return
-        self._seen, self._is_news, self._is_polished = self.length, True, False
-        if had_none and self._settings.shortcut:
-            self._polishings = POLISHINGS
+        self._insert_if_better(self._runs.collect())
+        if not self._runs.exhausted:
+            has_footprint = bool(self._problem.vehicle.footprint)
+            self._runs.start(BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS, self.cost)
 
-    def _aim_below_best(self) -> None:
-        """Draw and add only what can be on a path shorter than the best, and forget the nodes that cannot."""
-        if self._from_start is None:
-            self._from_start = self._bound_from_start()  # first, as it was begun last and may not have been begun yet
+    def _limit_to_best(self) -> bool:
+        """Draw and add only what can be on a cheaper path than the best, and forget other nodes; False where nothing limits."""
+        if not self._bounds or self.best < 0:
+            return False
+        from_start = self._bounds.from_start
+        if from_start is None:
+            from_start = self._bounds.make_from_start()  # first, as it was started last and may not be under way yet
             self.make_bound()
-        limit = self.length
-        self._grower.set_cost_bound(limit, self._from_start.kernel, self._to_goal.kernel)
-        if limit < self._forgot_above * (1 - LEAST_FALL):
-            self._forgot_above = limit
-            places = np.asarray(self._tree.poses)[:self.size, :2]
-            wanted = self._from_start.at(places) + self._to_goal.at(places) < limit
+        self._kernel.set_cost_bound(self.cost, from_start.kernel, self._bounds.to_goal.kernel)
+        wanted = self._bounds.nodes_to_keep(np.asarray(self._tree.poses)[:self.size, :2], self.cost)
+        if wanted is not None:
             wanted[[0, self.best]] = True
             self._tree.prune_index(wanted.astype(np.int8))
+        return True
 
-    def _polished(self, path: Path, fresh: bool) -> Path:
-        return polished(path, self._problem.vehicle, self._field, self._rng, fresh)
+    def _rounds_due(self, had_path: bool, block_ended: bool) -> range:
+        """Return the rounds of smoothing that are due: all for a first path, and the last after a block, if worthwhile."""
+        if not self._settings.shortcut or self.best < 0:
+            return range(0)
+        if not had_path:
+            return range(ROUNDS)
+        return range(ROUNDS - 1, ROUNDS if block_ended and self._smoother.is_worthwhile(self.cost) else ROUNDS - 1)
+
+    def _smooth(self, rounds: range) -> Iterator[bool]:
+        """Smooth the best path; round 0 is that of a path with large loops."""
+        for number in rounds:
+            before, path = self.cost, self.path
+            if path:
+                smoothed = self._smoother.smooth(path, first_round=number == 0)
+                if path_cost(smoothed) < before:
+                    self._insert(smoothed, self.best)
+            self._smoother.record(before, self.cost)
+            yield self._may_end(smoothing_is_due=number + 1 < ROUNDS)
+
+    def _insert_if_better(self, path: Path | None) -> None:
+        """Add a path that hybrid A* found to the tree, if it is the best."""
+        if path is not None and path_cost(path) < self.cost:
+            self._insert(path, self.best if self._problem.exact_goal else -1)
+
+    def _insert(self, path: Path, end: int) -> None:
+        """Add a path to the tree; `end` is the node at its end, or -1 where the tree has none."""
+        pieces = path.cut(self._settings.step_size)
+        self._kernel.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
+        self.best = self._kernel.best_goal_node()

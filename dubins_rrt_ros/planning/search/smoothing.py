@@ -1,4 +1,7 @@
-"""Shortcuts and detours: a path made shorter by Dubins curves that are as free."""
+"""Smoothing: a path is made shorter by shortcuts and by moved waypoints, over curves that are as free."""
+
+import math
+from functools import cached_property
 
 import numpy as np
 
@@ -7,22 +10,49 @@ from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..vehicle import Vehicle
 
-#: How many changes are tried in one go.
+#: Number of changes that are tried in one round.
 TRIES = 512
-#: The share of shortcuts, which are coarse, among them: for a path that was just found, and for one that was polished before.
-FRESH, KNOWN = 0.8, 0.3
+#: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
+FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
+#: Minimum gain of a round, relative to the cost, that makes another one worthwhile.
+WORTHWHILE_GAIN = 1e-4
 
 
-def polished(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, fresh: bool) -> Path:
-    """A path with the same ends that is never longer.
+def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool) -> Path:
+    """Return a path with the same ends that is never longer.
 
     Args:
-        path: it is free for the vehicle; so is the answer.
-        fresh: whether it was not polished before, and may have large loops.
+        path: it is free for the vehicle, and so is what is returned.
+        first_round: True if it was not smoothed before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
     shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius, poses=path.waypoints,
                               words=path.words, lengths=path.lengths, tries=TRIES)
-    shortcutter.improve(draws, FRESH if fresh else KNOWN)
-    arrays = (np.array(view[:shortcutter.count]) for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
-    return Path(*arrays, path.radius)
+    shortcutter.improve(draws, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
+    waypoints, words, lengths = (np.array(view[:shortcutter.count])
+                                 for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
+    return Path(waypoints, words, lengths, path.radius)
+
+
+class Smoother:
+    """Smooths the best path of a search as long as that is worthwhile, by random numbers of its own."""
+
+    def __init__(self, vehicle: Vehicle, field: ClearanceField, seed: int):
+        self._vehicle, self._field, self._seed = vehicle, field, seed
+        self._exhausted_at = math.inf
+
+    @cached_property
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng((self._seed, 2))  # apart from those of the samples and of hybrid A*
+
+    def smooth(self, path: Path, first_round: bool) -> Path:
+        """Return a path with the same ends that is never longer."""
+        return smooth(path, self._vehicle, self._field, self._rng, first_round)
+
+    def record(self, before: float, after: float) -> None:
+        """Record the costs of the best path before and after a round."""
+        self._exhausted_at = after if before - after <= WORTHWHILE_GAIN * before else math.inf
+
+    def is_worthwhile(self, cost: float) -> bool:
+        """Return True unless the last round gained little and the best path has not become cheaper since."""
+        return cost < self._exhausted_at

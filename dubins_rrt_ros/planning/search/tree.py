@@ -40,26 +40,26 @@ class Tree:
     lengths: np.ndarray
 
     @classmethod
-    def copy_of(cls, grown: SearchTree) -> "Tree":
-        """What the planner has grown so far."""
-        arrays = (np.array(view[:grown.size]) for view in (grown.poses, grown.parents, grown.costs, grown.words, grown.lengths))
-        return cls(grown.radius, *arrays)
+    def copy_of(cls, tree: SearchTree) -> "Tree":
+        """Copy the tree of a search under way."""
+        arrays = (np.array(view[:tree.size]) for view in (tree.poses, tree.parents, tree.costs, tree.words, tree.lengths))
+        return cls(tree.radius, *arrays)
 
     @classmethod
     def of_root(cls, root: Pose, radius: float) -> "Tree":
-        """A tree of its root alone."""
+        """Return a tree of its root alone."""
         return cls(radius, np.array([root]), np.array([-1], np.int32), np.zeros(1), np.zeros(1, np.int8), np.zeros((1, 3)))
 
     def __len__(self) -> int:
         return len(self.parents)
 
     def curve_to(self, node: int) -> DubinsCurve:
-        """The edge from the parent of `node`."""
+        """Return the edge from the parent of `node`."""
         start = tuple(self.poses[self.parents[node]].tolist())
         return DubinsCurve(start, self.radius, WORDS[self.words[node]], tuple(self.lengths[node].tolist()))
 
     def path_to(self, node: int) -> Path:
-        """The path from the start to `node`."""
+        """Return the path from the start to `node`."""
         return path_to(node, self)
 
     def segments(self, spacing: float, most: int | None = None) -> np.ndarray:
@@ -112,7 +112,7 @@ class Tree:
         off, turned = math.hypot(end[0] - x, end[1] - y), abs(math.remainder(end[2] - theta, math.tau))
         if not (off <= 1e-9 * (1 + curve.length) and turned <= 1e-9):
             raise TreeError(f"the edge to node {node} ends at {end}, not at ({x}, {y}, {theta})")
-        if field is not None and not field.curve_is_free(curve, vehicle):
+        if field and vehicle and not field.curve_is_free(curve, vehicle):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
 
 
@@ -123,4 +123,5 @@ def path_to(node: int, tree: Tree | SearchTree) -> Path:
         nodes.append(node)
         node = tree.parents[node]
     nodes.reverse()
-    return Path(*(np.asarray(array)[nodes] for array in (tree.poses, tree.words, tree.lengths)), tree.radius)
+    poses, words, lengths = (np.asarray(array)[nodes] for array in (tree.poses, tree.words, tree.lengths))
+    return Path(poses, words, lengths, tree.radius)

@@ -1,4 +1,4 @@
-"""Polishing: never a longer path, with the same ends, as free as the one before, and the shortest where that is known."""
+"""Smoothing: never a longer path, with the same ends, as free as the one before, and the shortest where that is known."""
 
 import math
 
@@ -20,7 +20,7 @@ from support.cases import (
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path
 from dubins_rrt_ros.planning.curves import dubins
-from dubins_rrt_ros.planning.search.smoothing import polished
+from dubins_rrt_ros.planning.search.smoothing import smooth
 
 COUNT = 60 if SCALE == 1 else 6
 VEHICLE = Vehicle(0.5, 0.2)
@@ -40,11 +40,11 @@ def rrt_paths(count, **options):
             yield problem, clearance, search.path
 
 
-def polish(path, vehicle, field, times=1, seed=0):
-    """The path polished so often, and its length each time."""
+def smoothed(path, vehicle, field, times=1, seed=0):
+    """The path smoothed that many times, and its length each time."""
     rng, lengths = np.random.default_rng(seed), [path.length]
     for time in range(times):
-        path = polished(path, vehicle, field, rng, fresh=time == 0)
+        path = smooth(path, vehicle, field, rng, first_round=time == 0)
         lengths.append(path.length)
     return path, lengths
 
@@ -70,10 +70,10 @@ def assert_close(pose, other):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"step_size": 1.5}, {"planner": "rrt_star", "samples": scaled(300, least=50)}])
-def test_a_polished_path_is_as_free_and_never_longer(options):
+def test_a_smoothed_path_is_as_free_and_never_longer(options):
     gains = []
     for problem, clearance, path in rrt_paths(COUNT, **options):
-        shorter, lengths = polish(path, problem.vehicle, field_of(problem), times=4)
+        shorter, lengths = smoothed(path, problem.vehicle, field_of(problem), times=4)
         assert (np.diff(lengths) <= 1e-9).all()
         assert shorter.waypoints[[0, -1]].tobytes() == path.waypoints[[0, -1]].tobytes()
         assert shorter.length == pytest.approx(shorter.lengths[1:].sum())
@@ -85,10 +85,10 @@ def test_a_polished_path_is_as_free_and_never_longer(options):
     assert np.mean(gains) > 0.02
 
 
-def test_a_path_is_polished_by_the_rng_alone():
+def test_a_path_is_smoothed_by_the_rng_alone():
     for problem, _, path in rrt_paths(COUNT // 6):
         given = arrays_of(path)
-        once, again, other = (polish(path, problem.vehicle, field_of(problem), seed=seed)[0] for seed in (1, 1, 2))
+        once, again, other = (smoothed(path, problem.vehicle, field_of(problem), seed=seed)[0] for seed in (1, 1, 2))
         assert arrays_of(once) == arrays_of(again)
         assert len(path.words) < 4 or once.waypoints.tobytes() != other.waypoints.tobytes()
         assert arrays_of(path) == given
@@ -100,7 +100,7 @@ def test_the_numbers_drawn_do_not_depend_on_the_path():
     states = []
     for path in (short, path_over([(-8.0, -8.0, 0.0), (0.0, 5.0, 3.0), (3.0, -5.0, 3.0), (8.0, 8.0, 0.0)], 0.5)):
         rng = np.random.default_rng(1)
-        polished(path, VEHICLE, field, rng, True)
+        smooth(path, VEHICLE, field, rng, True)
         states.append(rng.bit_generator.state["state"])
     assert states[0] == states[1]
 
@@ -112,7 +112,7 @@ def test_a_loop_on_an_open_field_becomes_the_dubins_curve():
     direct = dubins.shortest(start, goal, 0.5).length
     assert path.length > 1.5 * direct
     for seed in range(scaled(20)):
-        shorter, lengths = polish(path, VEHICLE, ClearanceField(empty_map()), times=6, seed=seed)
+        shorter, lengths = smoothed(path, VEHICLE, ClearanceField(empty_map()), times=6, seed=seed)
         assert shorter.length == pytest.approx(direct, abs=1e-6)
         assert lengths[-1] >= direct - 1e-9
         assert tuple(shorter.waypoints[0]) == start
@@ -121,7 +121,7 @@ def test_a_loop_on_an_open_field_becomes_the_dubins_curve():
 
 def test_the_shortest_path_stays():
     path = path_over([(-8.0, -8.0, 0.5), (8.0, 8.0, 2.0)], 0.5)
-    shorter, _ = polish(path, VEHICLE, ClearanceField(empty_map()), times=3)
+    shorter, _ = smoothed(path, VEHICLE, ClearanceField(empty_map()), times=3)
     assert shorter == path
 
 
@@ -137,7 +137,7 @@ def walled():
 def test_no_shortcut_leads_through_a_thin_wall(seed):
     """The path tightens around its end: what is left above the shortest way of a point around the disc is for the turns."""
     problem, path = walled()
-    shorter, lengths = polish(path, VEHICLE, field_of(problem), times=scaled(8, least=2), seed=seed)
+    shorter, lengths = smoothed(path, VEHICLE, field_of(problem), times=scaled(8, least=2), seed=seed)
     assert audit_path(shorter, problem).ok
     assert shorter.poses(0.01)[:, 1].max() > 5.2
     around = 2 * math.hypot(2.85, 5.0)
@@ -153,7 +153,7 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
     data[18:22, 18:22] = 100
     problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), Vehicle(0.5, 0.5), (-8.0, 1.501, 0.0), (8.0, 1.501, 0.0))
     path = path_over([problem.start, (-2.0, 1.501, 0.0), (2.0, 1.501, 0.0), problem.goal], 0.5)
-    shorter, _ = polish(path, problem.vehicle, field_of(problem))
+    shorter, _ = smoothed(path, problem.vehicle, field_of(problem))
     assert shorter.length == pytest.approx(16, abs=1e-9)
     assert len(shorter.words) == 2
     assert audit_path(shorter, problem).ok
@@ -169,7 +169,7 @@ def test_a_path_along_an_edge_of_the_clearance_is_kept():
 @pytest.mark.parametrize("seed", range(3))
 def test_poses_that_come_twice_and_curves_of_no_length(poses, seed):
     path = path_over(poses, 0.5)
-    shorter, lengths = polish(path, VEHICLE, ClearanceField(empty_map()), times=3, seed=seed)
+    shorter, lengths = smoothed(path, VEHICLE, ClearanceField(empty_map()), times=3, seed=seed)
     assert (np.diff(lengths) <= 1e-9).all()
     assert shorter.waypoints[[0, -1]].tobytes() == path.waypoints[[0, -1]].tobytes()
     assert shorter.length == pytest.approx(dubins.shortest(poses[0], poses[-1], 0.5).length, abs=1e-6)
@@ -185,7 +185,7 @@ def test_a_path_of_thousands_of_curves():
     poses = [(float(a), float(b), float(c)) for a, b, c in zip(x, np.sin(x), np.arctan(np.cos(x)), strict=True)]
     path = path_over(poses, 0.5)
     assert len(path.words) == len(poses)
-    shorter, _ = polish(path, VEHICLE, ClearanceField(empty_map()), times=4)
+    shorter, _ = smoothed(path, VEHICLE, ClearanceField(empty_map()), times=4)
     direct = dubins.shortest(poses[0], poses[-1], 0.5).length
     assert direct - 1e-9 <= shorter.length < direct + 0.2 * (path.length - direct)
     at = path.waypoints[0]

@@ -1,0 +1,59 @@
+"""Lower bounds of the costs from the start and to the goal, computed in the background."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..collision.clearance import ClearanceField
+from ..problem import Problem
+from .background import BACKGROUND
+from .cost_to_go import CostToGo
+
+#: Minimum relative fall of the best cost for which nodes are pruned again.
+LEAST_FALL = 1e-4
+
+
+class CostBounds:
+    """The costs that no path over a place falls below.
+
+    Attributes:
+        to_goal: the cost to the goal, a lower bound once `make_to_goal` has been called.
+        from_start: the cost from the start, a lower bound; None until `make_from_start` has been called.
+    """
+
+    def __init__(self, problem: Problem, field: ClearanceField, to_goal: CostToGo):
+        self.to_goal = to_goal
+        self.from_start: CostToGo | None = None
+        self._problem, self._field = problem, field
+        self._jobs: tuple[Callable[[], None], Callable[[], CostToGo] | None] | None = None
+        self._pruned_at = math.inf
+
+    def start(self, from_start: bool = False) -> None:
+        """Start to compute the bound to the goal in the background, and that from the start where it is needed; only once."""
+        if self._jobs is None:
+            self._jobs = (BACKGROUND.start(self.to_goal.prepare_bound),
+                          BACKGROUND.start(self._computed_from_start) if from_start else None)
+
+    def _computed_from_start(self) -> CostToGo:
+        return CostToGo.from_start(self._problem, self._field).make_bound()
+
+    def make_to_goal(self) -> CostToGo:
+        """Make the cost to the goal a lower bound; nothing else may use it meanwhile."""
+        self.start()
+        if self._jobs:
+            self._jobs[0]()
+        return self.to_goal.make_bound()
+
+    def make_from_start(self) -> CostToGo:
+        """Make the bound from the start, or wait for it."""
+        job = self._jobs[1] if self._jobs else None
+        self.from_start = job() if job else self._computed_from_start()
+        return self.from_start
+
+    def nodes_to_keep(self, points: np.ndarray, limit: float) -> np.ndarray | None:
+        """Return (n,) truth values, False where every path over a point costs `limit` or more; None where few would be new."""
+        if self.from_start is None or limit >= self._pruned_at * (1 - LEAST_FALL):
+            return None
+        self._pruned_at = limit
+        return np.asarray(self.from_start.at(points) + self.to_goal.at(points) < limit)
