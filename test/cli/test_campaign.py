@@ -12,9 +12,9 @@ from support.cases import needs_compiled
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.campaign import judge as campaign_judge
 from dubins_rrt_ros.evaluation.campaign import problems as campaign_problems
-from dubins_rrt_ros.evaluation.campaign.judge import Task, judged
+from dubins_rrt_ros.evaluation.campaign.judge import TrialNumber, judge
 from dubins_rrt_ros.evaluation.campaign.problems import Trial, random_trial
-from dubins_rrt_ros.evaluation.campaign.runs import results
+from dubins_rrt_ros.evaluation.processes import run_in_processes
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner
 from dubins_rrt_ros.planning._kernels.collision import CollisionChecker
 from dubins_rrt_ros.planning.diagnosis import explain as reasons
@@ -34,7 +34,7 @@ def walled_trial(fits=None, start=START, turning_radius=0.5, walled_off=False, *
 def findings_of(trial, monkeypatch, number=0):
     """What the judge finds wrong with the planner's answer to a problem."""
     monkeypatch.setattr(campaign_judge, "random_trial", lambda seed, number: trial)
-    return judged(Task(0, number))["findings"]
+    return judge(TrialNumber(0, number))["findings"]
 
 
 def contents(trial):
@@ -176,7 +176,7 @@ def test_an_answer_that_changes_is_found(monkeypatch):
 @pytest.mark.slow
 def test_a_process_that_dies_or_hangs_is_told_and_replaced():
     dies, hangs = "__import__('os')._exit(3)", "__import__('time').sleep(3600)"
-    found = list(results(eval, ["1", dies, "2", hangs, "3", "4"], 2, 8.0, lambda task, what: (task, what)))
+    found = list(run_in_processes(eval, ["1", dies, "2", hangs, "3", "4"], 2, 8.0, lambda task, what: (task, what)))
     assert len(found) == 6 and {1, 2, 3, 4} < set(found)
     assert {(dies, "the process died with status 3"), (hangs, "no answer within 8 s")} < set(found)
 
@@ -185,9 +185,9 @@ def test_after_ctrl_c_what_was_done_is_told(monkeypatch, capsys):
     def interrupted(task):
         if task.number == 2:
             raise KeyboardInterrupt
-        return judged(task)
+        return judge(task)
 
-    monkeypatch.setattr("dubins_rrt_ros.evaluation.campaign.command.judged", interrupted)
+    monkeypatch.setattr("dubins_rrt_ros.evaluation.campaign.command.judge", interrupted)
     status, out, error = run("--problems", "5", capsys=capsys)
     assert status == 130 and "2 problems of seed 0" in out and error == "dubins_rrt campaign: interrupted\n"
 

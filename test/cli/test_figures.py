@@ -1,4 +1,4 @@
-"""`dubins_rrt figures`: it draws what the documentation shows, always the same, and the walk that it shows is the planner's."""
+"""`dubins_rrt figures`: it draws what the documentation shows, always the same, and as the planner advances along curves."""
 
 import json
 import re
@@ -56,7 +56,7 @@ def test_a_figure_has_the_same_bytes_each_time(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_walk_that_is_drawn_finds_the_curves_free_that_the_planner_finds_free():
+def test_the_advancement_that_is_drawn_finds_the_curves_free_that_the_planner_finds_free():
     rng, found = np.random.default_rng(1), []
     for _ in range(20):
         map = random_map(rng)
@@ -64,10 +64,10 @@ def test_the_walk_that_is_drawn_finds_the_curves_free_that_the_planner_finds_fre
         corners = map.corners()
         for points in corners[0] + rng.random((10, 2, 2)) @ (corners[[1, 3]] - corners[0]):
             start, goal = ((*point, float(rng.uniform(-4, 4))) for point in points.tolist())
-            need, curve = float(rng.uniform(0, 0.5)), shortest(start, goal, 0.7)
-            looks = figures_geometry.walk(field, curve, need)
-            free = all(look.clearance >= need + CLEARANCE_MARGIN for look in looks)
-            assert free == field.curve_is_free(curve, Vehicle(robot_radius=need))
+            required, curve = float(rng.uniform(0, 0.5)), shortest(start, goal, 0.7)
+            queries = figures_geometry.advance(field, curve, required)
+            free = all(query.clearance >= required + CLEARANCE_MARGIN for query in queries)
+            assert free == field.curve_is_free(curve, Vehicle(robot_radius=required))
             found.append(free)
     assert 20 < sum(found) < 180
 

@@ -80,7 +80,7 @@ def test_campaign_writes_its_counts(capsys):
 def test_campaign_writes_what_is_wrong_with_the_command_that_repeats_it(monkeypatch, capsys):
     wrong = {"seed": 2, "number": 7, "kind": "gap", "fits": False, "status": "NONE", "edges": 1, "curves": 2, "paths": 1,
              "findings": ["it found a path where there is none"]}
-    monkeypatch.setattr("dubins_rrt_ros.evaluation.campaign.command.judged", lambda task: wrong)
+    monkeypatch.setattr("dubins_rrt_ros.evaluation.campaign.command.judge", lambda task: wrong)
     document, _ = alone("campaign", "--problems", "1", capsys=capsys, status=1)
     assert document["kinds"] == {"gap, does not pass": {"NONE": 1}}
     assert document["disagreements"] == [{"number": 7, "kind": "gap", "findings": wrong["findings"],

@@ -15,7 +15,7 @@ from matplotlib.image import imread
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, Outcome, Run
+from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, Outcome, PaperRun
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
@@ -34,7 +34,7 @@ def folder(tmp_path_factory):
 def lengths(folder):
     """The lengths by run."""
     lines = [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()]
-    return {Run(*(line[name] for name in Run._fields)): line["length"] for line in lines}
+    return {PaperRun(*(line[name] for name in PaperRun._fields)): line["length"] for line in lines}
 
 
 def outcome(length, samples_to_first):
@@ -63,7 +63,7 @@ def test_rrt_star_is_never_longer_with_more_samples_of_the_same_seed(lengths):
 @pytest.mark.slow
 @needs_compiled
 def test_rrt_star_is_at_least_8_percent_shorter_than_rrt(folder, lengths):
-    rrt, star = (min(lengths[Run("maze", planner, 3000, "uniform", 0.0, seed)] for seed in (0, 1))
+    rrt, star = (min(lengths[PaperRun("maze", planner, 3000, "uniform", 0.0, seed)] for seed in (0, 1))
                  for planner in ("rrt", "rrt_star"))
     assert star <= 0.92 * rrt
     row, = report_rows(folder, "3000")
@@ -80,9 +80,9 @@ def test_the_runs_are_those_of_the_papers_algorithms(lengths):
     problem = Problem(load_map(file), Vehicle(turning_radius=1.0, robot_radius=0.2), poses["start"], poses["goal"])
     for planner, samples in (("rrt", 3000), ("rrt_star", 500)):
         answer = plan(problem, Settings(planner=planner, samples=samples, seed=1, **PLAIN))
-        assert lengths[Run("forest", planner, samples, "uniform", 0.0, 1)] == answer.length
+        assert lengths[PaperRun("forest", planner, samples, "uniform", 0.0, 1)] == answer.length
     limited = plan(problem, Settings(planner="rrt", seed=0, **PLAIN | {"heading_sampling": "field"}, step_size=2.0))
-    assert lengths[Run("forest", "rrt", 3000, "field", 2.0, 0)] == limited.length
+    assert lengths[PaperRun("forest", "rrt", 3000, "field", 2.0, 0)] == limited.length
 
 
 @pytest.mark.slow
@@ -102,7 +102,7 @@ def test_the_report_is_whole_and_shows_every_figure(folder):
 @needs_compiled
 def test_rrt_with_headings_towards_the_goal_never_passes_the_second_wall(folder, lengths):
     """As the report explains."""
-    assert all(lengths[Run("maze", "rrt", 3000, "goal", 0.0, seed)] is None for seed in (0, 1))
+    assert all(lengths[PaperRun("maze", "rrt", 3000, "goal", 0.0, seed)] is None for seed in (0, 1))
     assert "finds a path through the maze with 0 of 2 seeds" in " ".join((folder / "report.md").read_text().split())
 
 
@@ -113,7 +113,7 @@ def test_json_holds_the_tables_and_the_answer(folder, lengths):
     assert document["report"] == str(folder / "report.md") and document["seeds"] == 2
     assert [row["samples"] for row in document["table"]] == list(TABLE)
     last = document["table"][-1]
-    shorter, longer = sorted(lengths[Run("maze", "rrt_star", 3000, "uniform", 0.0, seed)] for seed in (0, 1))
+    shorter, longer = sorted(lengths[PaperRun("maze", "rrt_star", 3000, "uniform", 0.0, seed)] for seed in (0, 1))
     assert last["rrt_star"]["length"] == {"lower_quartile": shorter, "median": shorter, "upper_quartile": longer}
     assert last["paper"] == {"rrt": 22.54, "rrt_star": 20.26} and last["rrt"]["runs"] == last["rrt"]["solved"] == 2
     stuck, = (row["rrt"] for row in document["question"]
@@ -124,7 +124,7 @@ def test_json_holds_the_tables_and_the_answer(folder, lengths):
 
 
 def test_rrt_with_fewer_samples_has_what_it_found_by_then():
-    runs = [Run("maze", "rrt", 3000, "uniform", 0.0, seed) for seed in range(3)]
+    runs = [PaperRun("maze", "rrt", 3000, "uniform", 0.0, seed) for seed in range(3)]
     found = [outcome(30.0, 120), outcome(20.0, 700), outcome(25.0, 400)]
     measured = Measured(dict(zip(runs, found, strict=True)), 3)
     assert [run.length for run in measured.of("maze", "rrt", 500)] == [30.0, math.inf, 25.0]
@@ -135,8 +135,9 @@ def test_rrt_with_fewer_samples_has_what_it_found_by_then():
 @pytest.mark.parametrize("samples, seed, found", [(3000, 2, 3), (500, 2, 2), (150, 0, 1), (50, 0, 0)])
 def test_the_picture_shows_the_median_of_the_paths_that_were_found(samples, seed, found):
     firsts = {0: (30.0, 120), 1: (20.0, 700), 2: (25.0, 400)}
-    measured = Measured({Run("maze", "rrt", 3000, "uniform", 0.0, seed): outcome(*first) for seed, first in firsts.items()}, 3)
-    assert measured.median_run("maze", "rrt", samples) == (Run("maze", "rrt", samples, "uniform", 0.0, seed), found)
+    outcomes = {PaperRun("maze", "rrt", 3000, "uniform", 0.0, number): outcome(*first) for number, first in firsts.items()}
+    measured = Measured(outcomes, 3)
+    assert measured.median_run("maze", "rrt", samples) == (PaperRun("maze", "rrt", samples, "uniform", 0.0, seed), found)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`dubins_rrt campaign`: random problems that try to prove the planner wrong."""
+"""`dubins_rrt campaign`: plan random problems, and report every answer that the audit or a second plan proves wrong."""
 
 import argparse
 import contextlib
@@ -14,15 +14,15 @@ from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_docu
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
-from .judge import Task, judged
-from .runs import results
+from ..processes import run_in_processes
+from .judge import TrialNumber, judge
 
-#: A problem that takes longer hangs [s]: it is planned twice at most, for a minute each.
+#: Time after which a problem is taken to hang [s]: it is planned at most twice, for a minute each.
 LIMIT = 300.0
-#: How an answer without a path ends, in the table.
+#: Columns of the table, and the statuses that each counts.
 _COLUMNS = {"path": ("NONE",), "no path": ("NO_VALID_PATH",), "occupied": ("START_OCCUPIED", "GOAL_OCCUPIED"),
             "outside": ("START_OUTSIDE_MAP", "GOAL_OUTSIDE_MAP"), "time limit": ("TIMEOUT",)}
-#: What is known of the vehicle, in the table.
+#: Additions to a row's name by what is known of the vehicle.
 _KNOWN = {True: ", passes", False: ", does not pass", None: ""}
 
 
@@ -33,16 +33,16 @@ def add_arguments(parser: Parser) -> None:
         description="Plans random problems - grids of many resolutions, polygons, mazes, gaps that just pass and that just fail, "
                     "starts and goals that touch obstacles, discs and polygons as vehicles, all planners and samplers - and "
                     "judges each answer by the audit: the path, all edges of the tree, and what the status claims.",
-        notes="A number and a seed always give the same problem. Whatever is wrong is told with the command that repeats it. "
+        notes="A number and a seed always give the same problem. Each disagreement is reported with the command that repeats it. "
               "Where it is interrupted, what was done by then is reported.",
         examples=["dubins_rrt campaign --problems 20", "dubins_rrt campaign --problems 10000 --seed 5 --jobs 2 --json -"],
         exit_status="0 all is right, 1 something is not, 2 wrong usage, 130 interrupted")
-    parser.add_argument("--problems", metavar="N", type=int, default=1000, help="how many; default 1000")
-    parser.add_argument("--seed", metavar="S", type=int, default=0, help="of the problems; default 0")
-    parser.add_argument("--first", metavar="K", type=int, default=0, help="the number of the first problem; default 0")
+    parser.add_argument("--problems", metavar="N", type=int, default=1000, help="number of problems; default 1000")
+    parser.add_argument("--seed", metavar="S", type=int, default=0, help="seed of the problems; default 0")
+    parser.add_argument("--first", metavar="K", type=int, default=0, help="number of the first problem; default 0")
     parser.add_argument("--jobs", metavar="J", type=int, default=1,
-                        help=f"work in J processes, where crashes and problems that take more than {LIMIT:g} s are told too; "
-                             "default 1, this process")
+                        help="number of processes; with more than one, crashes and problems that take over "
+                             f"{LIMIT:g} s are reported too; default 1, this process")
     parser.add_argument("--out", metavar="FILE", help="write a line of JSON for each problem")
     add_json_flag(parser, "the counts, and all disagreements,")
 
@@ -53,20 +53,21 @@ def run(arguments: argparse.Namespace) -> int:
         if getattr(arguments, name) < least:
             raise UsageError(f"--{name} is {getattr(arguments, name)}; give {least} or more")
     check_folder(arguments.out, arguments.json)
-    tasks = [Task(arguments.seed, arguments.first + i) for i in range(arguments.problems)]
-    lines, begin = [], time.perf_counter()
+    tasks = [TrialNumber(arguments.seed, arguments.first + i) for i in range(arguments.problems)]
+    lines: list[dict[str, Any]] = []
+    begin = time.perf_counter()
     try:
         lines.extend(_lines(tasks, arguments.jobs, arguments.out))
     except KeyboardInterrupt:
-        _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
+        _report(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
         raise
-    _tell(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
+    _report(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
     return 1 if any(line["findings"] for line in lines) else 0
 
 
-def _lines(tasks: list[Task], jobs: int, file: str | None) -> Iterator[dict[str, Any]]:
-    """The lines of all tasks, each written to the file as soon as it is there."""
-    running = map(judged, tasks) if jobs == 1 else results(judged, tasks, jobs, LIMIT, _lost)
+def _lines(tasks: list[TrialNumber], jobs: int, file: str | None) -> Iterator[dict[str, Any]]:
+    """Yield the lines of all tasks, each written to the file as soon as it is there."""
+    running = map(judge, tasks) if jobs == 1 else run_in_processes(judge, tasks, jobs, LIMIT, _lost)
     with contextlib.ExitStack() as stack:
         out = stack.enter_context(Path(file).open("w", encoding="utf-8")) if file else None
         for line in with_bar(running, len(tasks), " problems"):
@@ -76,20 +77,20 @@ def _lines(tasks: list[Task], jobs: int, file: str | None) -> Iterator[dict[str,
             yield line
 
 
-def _lost(task: Task, what: str) -> dict[str, Any]:
-    """The line of a problem that no answer came to."""
+def _lost(task: TrialNumber, what: str) -> dict[str, Any]:
+    """Return the line of a problem without an answer."""
     return {"seed": task.seed, "number": task.number, "kind": "lost", "status": "", "edges": 0, "curves": 0, "paths": 0,
             "seconds": LIMIT, "findings": [what]}
 
 
-def _tell(counts: dict[str, Any], json_file: str | None) -> None:
+def _report(counts: dict[str, Any], json_file: str | None) -> None:
     if json_file:
         write_document(json_file, counts)
-    print(_report(counts), file=words_for(json_file))
+    print(_summary(counts), file=words_for(json_file))
 
 
 def _counts(lines: list[dict[str, Any]], seed: int, seconds: float) -> dict[str, Any]:
-    """What the campaign came to: how many problems of each kind ended how, and each disagreement with what repeats it."""
+    """Count how the problems of each kind ended, and list each disagreement with the command that repeats it."""
     labels = [line["kind"] + _KNOWN[line.get("fits")] for line in lines]
     kinds = {label: dict(Counter(line["status"] for line, its in zip(lines, labels, strict=True) if its == label))
              for label in sorted(set(labels))}
@@ -101,12 +102,12 @@ def _counts(lines: list[dict[str, Any]], seed: int, seconds: float) -> dict[str,
 
 
 def _repeat(line: dict[str, Any]) -> str:
-    """The command that repeats a problem."""
+    """Return the command that repeats a problem."""
     return f"dubins_rrt campaign --seed {line['seed']} --first {line['number']} --problems 1"
 
 
-def _report(counts: dict[str, Any]) -> str:
-    """The counts in words."""
+def _summary(counts: dict[str, Any]) -> str:
+    """Write the counts in words."""
     problems, wrong = counts["problems"], counts["disagreements"]
     parts = [*_table(counts["kinds"]),
              f"{problems} problem{'s' * (problems != 1)} of seed {counts['seed']} in {counts['seconds']:.0f} s: "
@@ -119,9 +120,9 @@ def _report(counts: dict[str, Any]) -> str:
 
 
 def _table(kinds: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
-    """How many problems of each kind ended how."""
+    """Yield the rows of the table: how many problems of each kind ended how."""
     yield _row("", "problems", *_COLUMNS, "other")
-    for kind, ends in (kinds | {"all": sum(map(Counter, kinds.values()), Counter())}).items():
+    for kind, ends in {**kinds, "all": sum(map(Counter, kinds.values()), Counter())}.items():
         counts = [sum(ends.get(name, 0) for name in names) for names in _COLUMNS.values()]
         yield _row(kind, sum(ends.values()), *counts, sum(ends.values()) - sum(counts))
 

@@ -1,4 +1,4 @@
-"""The judgement of `dubins_rrt campaign`: whether the planner's answer to a problem is right, by the audit alone."""
+"""The judgement of `dubins_rrt campaign`: is the planner's answer to a problem right? The audit alone decides."""
 
 import math
 import time
@@ -33,33 +33,34 @@ from dubins_rrt_ros.planning.curves.dubins import shortest
 
 from .problems import AMPLE_TIME, MANY_SAMPLES, Trial, random_trial
 
-#: With so much more than it needs to be free, the planner must not refuse a pose or a curve [m].
+#: Clearance beyond the required one with which the planner must accept a pose or a curve [m].
 MARGIN = 0.001
-#: What rounding may make of a gap of 0 [m].
+#: Largest gap that rounding makes of 0 [m].
 ROUNDING = 1e-9
-#: How much longer than its time limit a request may take [s], not counting the time that the machine works at something else.
+#: Time that a request may take beyond its limit [s], without the time that the machine spends on other work.
 LATE = 1.0
-#: So many curves are drawn at random for which the planner's verdict is compared with the audit's.
+#: Number of random curves for which the planner's verdict is compared with the audit's.
 CURVES = 6
-#: One of so many problems is planned again as it is, which must give the same answer, and another one in another way.
+#: Of this number of problems one is planned again, which must give the same answer, and one in another way.
 OTHERS = 20
-#: Into so many pieces a quarter of a circle is cut, where polygons are made narrower.
+#: Number of segments of a quarter circle where polygons are shrunk.
 QUARTER = 32
 _REFUSALS = {Status.START_OUTSIDE_MAP: "start", Status.START_OCCUPIED: "start", Status.GOAL_OUTSIDE_MAP: "goal",
              Status.GOAL_OCCUPIED: "goal"}
 _OUTSIDE = Status.START_OUTSIDE_MAP, Status.GOAL_OUTSIDE_MAP
 
 
-class Task(NamedTuple):
-    """Which problem is to be judged."""
+class TrialNumber(NamedTuple):
+    """The seed and the number that determine a problem."""
 
     seed: int
     number: int
 
 
-def judged(task: Task) -> dict[str, Any]:
-    """Make a problem, plan it and judge the answer: figures by name, and under `findings` what is wrong, a sentence each."""
-    line = {"seed": task.seed, "number": task.number, "kind": "", "status": "", "edges": 0, "curves": 0, "paths": 0}
+def judge(task: TrialNumber) -> dict[str, Any]:
+    """Make a problem, plan it and judge the answer; return figures by name, and `findings`, a sentence for each mistake."""
+    line: dict[str, Any] = {"seed": task.seed, "number": task.number, "kind": "", "status": "",
+                            "edges": 0, "curves": 0, "paths": 0}
     begin = time.perf_counter()
     try:
         trial = random_trial(*task)
@@ -70,13 +71,13 @@ def judged(task: Task) -> dict[str, Any]:
         answer = plan(trial.problem, trial.settings)
         worked = time.process_time() - begin_of_work
         line |= {"status": answer.status.name, "message": answer.message, "samples": answer.samples, "length": answer.length}
-        findings = list(_of_answer(trial, answer, worked))
+        findings = list(_check_answer(trial, answer, worked))
         if task.number % OTHERS == 0:
-            findings += _of_repetition(trial, answer)
+            findings += _check_repetition(trial, answer)
         elif task.number % OTHERS == 1:
-            findings += _of_another_way(trial, answer)
+            findings += _check_other_planner(trial, answer)
         curves = list(_random_curves(trial.problem, answer.tree, task))
-        findings += [finding for curve in curves for finding in _of_curve(trial.problem, world, curve)]
+        findings += [finding for curve in curves for finding in _check_curve(trial.problem, world, curve)]
         line |= {"edges": len(answer.tree) - 1, "curves": len(curves), "paths": int(answer.path is not None)}
     except Exception as error:  # whatever it is, the campaign has found it
         where = traceback.extract_tb(error.__traceback__)[-1]
@@ -90,12 +91,12 @@ def _described(trial: Trial) -> dict[str, Any]:
             "vehicle": values(problem.vehicle), "settings": asdict(trial.settings)}
 
 
-def _of_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
-    """What is wrong with an answer that the processor worked at for so long [s]."""
+def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
+    """Yield what is wrong with an answer that took `worked` of processor time [s]."""
     problem, settings = trial.problem, trial.settings
-    yield from _of_invariants(answer)
-    yield from _of_tree(problem, answer.tree, settings.step_size)
-    yield from _of_ends(problem, answer)
+    yield from _check_invariants(answer)
+    yield from _check_tree(problem, answer.tree, settings.step_size)
+    yield from _check_ends(problem, answer)
     if min(answer.planning_time, worked) > settings.planning_time + LATE:
         yield f"it took {answer.planning_time:.3g} s, the limit being {settings.planning_time:g} s"
     if answer.path is not None:
@@ -103,7 +104,7 @@ def _of_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         if trial.fits is False:
             yield "it found a path where there is none"
     elif answer.status == Status.NO_VALID_PATH:
-        yield from _of_failure(trial, answer)
+        yield from _check_failure(trial, answer)
     elif answer.status == Status.TIMEOUT:
         if answer.planning_time < settings.planning_time:
             yield f"it gave up after {answer.planning_time:.3g} s, the limit being {settings.planning_time:g} s"
@@ -111,16 +112,16 @@ def _of_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         yield f"{answer.status.name}: {answer.message}"
 
 
-def _of_invariants(answer: Plan) -> Iterator[str]:
-    """What the answer's own check() finds."""
+def _check_invariants(answer: Plan) -> Iterator[str]:
+    """Yield what the answer's own check() finds."""
     try:
         answer.check()
     except (PlanError, PathError, TreeError) as breach:
         yield f"{type(breach).__name__}: {breach}"
 
 
-def _of_tree(problem: Problem, tree: Tree, step_size: float) -> Iterator[str]:
-    """What is wrong with the edges of a tree, whose costs and parents its own check() has seen."""
+def _check_tree(problem: Problem, tree: Tree, step_size: float) -> Iterator[str]:
+    """Yield what is wrong with the edges of a tree; its own check() covers costs and parents."""
     curves = [tree.curve_to(node) for node in range(1, len(tree))]
     for finding in audit_curves(curves, tree.poses[1:].tolist(), problem):
         yield f"the tree's edges: {finding}"
@@ -129,20 +130,20 @@ def _of_tree(problem: Problem, tree: Tree, step_size: float) -> Iterator[str]:
         yield f"an edge is {longest:g} m long, step_size being {step_size:g} m"
 
 
-def _of_ends(problem: Problem, answer: Plan) -> Iterator[str]:
-    """What is wrong with the status, as to whether the start and the goal are free and in the map."""
+def _check_ends(problem: Problem, answer: Plan) -> Iterator[str]:
+    """Yield what is wrong with what the status says of the start and the goal: free or not, in the map or not."""
     for name, is_one_pose in (("start", True), ("goal", problem.exact_goal)):
         pose = getattr(problem, name)
         room = float(pose_gaps(np.array([pose]), problem)[0]) if is_one_pose else _room_around(problem, pose)
         if _REFUSALS.get(answer.status) == name:
-            yield from _of_refusal(answer.status, room, _away_from(problem.map, pose))
+            yield from _check_refusal(answer.status, room, _outside(problem.map, pose))
             return  # nothing is claimed of the other
         if is_one_pose and (room < -ROUNDING or (room <= 0 and problem.vehicle.footprint)):
             yield f"{answer.status.name}, but at the {name} the vehicle has no room: {room:.6g} m"
 
 
-def _of_refusal(status: Status, room: float, outside: float) -> Iterator[str]:
-    """What is wrong where a pose was refused that has so much room, and is so far outside the map [m]."""
+def _check_refusal(status: Status, room: float, outside: float) -> Iterator[str]:
+    """Yield what is wrong with the refusal of a pose that has `room` to spare and is `outside` the map by so much [m]."""
     if room > MARGIN:
         yield f"{status.name}, but the vehicle has {room:.6f} m to spare there"
     if status in _OUTSIDE and outside == 0:
@@ -152,20 +153,20 @@ def _of_refusal(status: Status, room: float, outside: float) -> Iterator[str]:
 
 
 def _room_around(problem: Problem, goal: Pose) -> float:
-    """The largest gap that the largest disc in the vehicle has at some places within the goal's tolerance [m]."""
+    """Return the largest gap of the vehicle's inscribed disc at some places within the goal's tolerance [m]."""
     bearing = np.linspace(0, math.tau, 24, endpoint=False)
     ring = np.column_stack([np.cos(bearing), np.sin(bearing)])
     points = np.vstack([[(0.0, 0.0)], ring / 2, ring]) * problem.goal_tolerance_xy + goal[:2]
     return float(clearances(points, problem).max()) - problem.vehicle.inscribed_radius
 
 
-def _away_from(map: Map, pose: Pose) -> float:
-    """How far a pose is outside a map's rectangle [m]; 0 in it."""
-    return float(shapely.distance(shapely.Polygon(map.corners()), shapely.Point(pose[:2])))
+def _outside(world_map: Map, pose: Pose) -> float:
+    """Return the distance of a pose from the rectangle of a map [m]; 0 in it."""
+    return float(shapely.distance(shapely.Polygon(world_map.corners()), shapely.Point(pose[:2])))
 
 
-def _of_failure(trial: Trial, answer: Plan) -> Iterator[str]:
-    """What is wrong with a statement that there is no path, or that none was found."""
+def _check_failure(trial: Trial, answer: Plan) -> Iterator[str]:
+    """Yield what is wrong with the statement that there is no path, or that none was found."""
     problem, settings = trial.problem, trial.settings
     if answer.message.startswith("No path exists"):
         if trial.fits or _is_connected(problem):
@@ -178,40 +179,42 @@ def _of_failure(trial: Trial, answer: Plan) -> Iterator[str]:
 
 
 def _is_connected(problem: Problem) -> bool:
-    """Whether a disc as wide as the vehicle everywhere around its reference point, with a millimetre to spare, can get there."""
-    need = (problem.vehicle.inscribed_radius + MARGIN) / math.cos(math.pi / 4 / QUARTER)
-    room = _free_space(problem).buffer(-need, quad_segs=QUARTER)
+    """Return True if the vehicle's inscribed disc, with a millimetre to spare, can get from start to goal."""
+    required = (problem.vehicle.inscribed_radius + MARGIN) / math.cos(math.pi / 4 / QUARTER)
+    room = _free_space(problem).buffer(-required, quad_segs=QUARTER)
     start, goal = (shapely.Point(_in_frame(problem.map, pose)) for pose in (problem.start, problem.goal))
     return any(part.distance(start) == 0 and part.distance(goal) <= max(0.0, problem.goal_tolerance_xy - ROUNDING)
                for part in shapely.get_parts(room))
 
 
 def _free_space(problem: Problem) -> shapely.Geometry:
-    """As polygons: in the grid's own frame where the map is one."""
-    map = problem.map
-    if not isinstance(map, GridMap):
-        return map.free
-    rows, columns = np.nonzero(~map.blocked(problem.allow_unknown))
-    return shapely.union_all(shapely.box(*(map.resolution * np.array([columns, rows, columns + 1, rows + 1]))))
+    """Return the free space as polygons, in the frame of the grid if the map is one."""
+    world_map = problem.map
+    if not isinstance(world_map, GridMap):
+        return world_map.free
+    rows, columns = np.nonzero(~world_map.blocked(problem.allow_unknown))
+    return shapely.union_all(shapely.box(*(world_map.resolution * np.array([columns, rows, columns + 1, rows + 1]))))
 
 
-def _in_frame(map: Map, pose: Pose) -> tuple[float, float]:
-    if not isinstance(map, GridMap):
+def _in_frame(world_map: Map, pose: Pose) -> tuple[float, float]:
+    if not isinstance(world_map, GridMap):
         return pose[0], pose[1]
-    return tuple(map.to_grid_frame(np.array(pose[:2])).tolist())
+    x, y = world_map.to_grid_frame(np.array(pose[:2])).tolist()
+    return x, y
 
 
-def _random_curves(problem: Problem, tree: Tree, task: Task) -> Iterator[DubinsCurve]:
-    """The shortest curve from start to goal, and some between nodes of the tree."""
+def _random_curves(problem: Problem, tree: Tree, task: TrialNumber) -> Iterator[DubinsCurve]:
+    """Yield the shortest curve from start to goal, and some between nodes of the tree."""
     rng = np.random.default_rng((task.seed, task.number, 1))
     radius = problem.vehicle.turning_radius
     yield shortest(problem.start, problem.goal, radius)
     for pair in rng.integers(len(tree), size=(CURVES - 1, 2)):
-        yield shortest(*map(tuple, tree.poses[pair].tolist()), radius)
+        begin, end = map(tuple, tree.poses[pair].tolist())
+        yield shortest(begin, end, radius)
 
 
-def _of_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator[str]:
-    """What is wrong with the planner's verdict on a curve."""
+def _check_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator[str]:
+    """Yield what is wrong with the planner's verdict on a curve."""
     free = world.field.curve_is_free(curve, problem.vehicle)
     if free and (findings := audit_curves([curve], [curve.end], problem)):
         yield f"the planner holds {curve} to be free: {'; '.join(findings)}"
@@ -221,8 +224,8 @@ def _of_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator[st
             yield f"the planner holds {curve} to touch something, but the gap is {gap - less:.6f} m or more"
 
 
-def _of_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
-    """What is wrong if the same request is made again."""
+def _check_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
+    """Yield what differs if the same request is made again."""
     if trial.settings.planning_time < AMPLE_TIME:  # its end depends on the time
         return
     again = plan(replace(trial.problem), trial.settings)
@@ -232,8 +235,8 @@ def _of_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
         yield f"planned again it came to {again.status.name}, and to another tree or path"
 
 
-def _of_another_way(trial: Trial, answer: Plan) -> Iterator[str]:
-    """What another planner's path, or a path where there was none, tells to be wrong."""
+def _check_other_planner(trial: Trial, answer: Plan) -> Iterator[str]:
+    """Yield what another planner's path proves wrong: a bound above it, or the claim that there is none."""
     settings = trial.settings
     planner = "rrt" if settings.planner == "rrt_star" else "rrt_star"
     other = plan(trial.problem, replace(settings, planner=planner, informed=not settings.informed, planning_time=AMPLE_TIME,
@@ -241,6 +244,6 @@ def _of_another_way(trial: Trial, answer: Plan) -> Iterator[str]:
     if other.path and answer.message.startswith("No path exists"):
         yield f"with {planner} there is a path, but: {answer.message}"
     if other.path and answer.path:
-        for bound, length in ((answer.lower_bound, other.length), (other.lower_bound, answer.length)):
+        for bound, length in ((answer.lower_bound, other.path.length), (other.lower_bound, answer.path.length)):
             if bound > length * (1 + ROUNDING) + ROUNDING:
                 yield f"{bound:.6f} m is said to be a lower bound, but there is a path of {length:.6f} m"

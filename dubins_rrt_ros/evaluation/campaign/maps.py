@@ -1,4 +1,4 @@
-"""Random maps for `dubins_rrt campaign`: grids of any resolution, polygons, mazes; turned, and far away."""
+"""Random maps for `dubins_rrt campaign`: grids of any resolution, polygons and mazes, some rotated, some far from the origin."""
 
 import math
 from collections.abc import Callable
@@ -9,28 +9,29 @@ from shapely import affinity
 
 from dubins_rrt_ros.planning import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, Pose
 
-#: The sides of the grids' cells [m].
+#: Range of resolutions of grids [m].
 RESOLUTIONS = 0.02, 2.0
-#: About how wide and high polygon maps are [m].
+#: Range of sides of polygon maps [m].
 SIDES = 2.0, 200.0
-#: How far away a map may be [m].
+#: Maximum distance of a map from the origin [m].
 FAR = 1e6
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """A random number each of whose orders of magnitude is as likely."""
+    """Draw a number whose logarithm is uniform."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def random_origin(rng: np.random.Generator) -> Pose:
-    """Where a map is: (x [m], y [m], yaw [rad]); at times not turned, at times by right angles, at times far away."""
-    reach = 5.0 if rng.random() < 0.8 else log_uniform(rng, 100.0, FAR)
+    """Draw the pose of a map (x [m], y [m], yaw [rad]): some are rotated, some by right angles, some far away."""
+    far = 5.0 if rng.random() < 0.8 else log_uniform(rng, 100.0, FAR)
     yaw = rng.choice([0.0, math.pi / 2 * rng.integers(-2, 3), rng.uniform(-math.pi, math.pi)], p=[0.3, 0.1, 0.6])
-    return (*rng.uniform(-reach, reach, 2).tolist(), float(yaw))
+    x, y = rng.uniform(-far, far, 2).tolist()
+    return x, y, float(yaw)
 
 
 def boxes_grid(rng: np.random.Generator) -> GridMap:
-    """Boxes of obstacles and of unknown space."""
+    """Draw boxes of obstacles and of unknown space."""
     data = np.zeros(rng.integers(8, 100, 2), np.int8)
     for value in [OCCUPIED] * rng.integers(0, 12) + [UNKNOWN] * rng.integers(0, 6):
         row, column = (rng.integers(0, size) for size in data.shape)
@@ -40,14 +41,14 @@ def boxes_grid(rng: np.random.Generator) -> GridMap:
 
 
 def noise_grid(rng: np.random.Generator) -> GridMap:
-    """Single cells, of all values that a grid can hold."""
+    """Draw single cells, of all values that a grid can hold."""
     shape, density = rng.integers(1, 80, 2), log_uniform(rng, 0.001, 0.15)
     data = np.where(rng.random(shape) < density, rng.integers(UNKNOWN, OCCUPIED + 1, shape), FREE)
     return _grid(rng, data.astype(np.int8))
 
 
 def maze_grid(rng: np.random.Generator) -> GridMap:
-    """A maze whose walls are one cell thick."""
+    """Draw a maze whose walls are one cell thick."""
     width = int(rng.integers(2, 9))
     open_ = _maze(rng, *rng.integers(2, 9, 2))
     sizes = [np.where(np.arange(side) % 2, width, 1) for side in open_.shape]
@@ -55,7 +56,7 @@ def maze_grid(rng: np.random.Generator) -> GridMap:
 
 
 def maze_polygons(rng: np.random.Generator) -> PolygonMap:
-    """A maze whose walls are thin."""
+    """Draw a maze whose walls are thin."""
     open_ = _maze(rng, *rng.integers(2, 6, 2))
     corridor, wall = log_uniform(rng, 0.5, 5.0), log_uniform(rng, 0.001, 0.2)
     across, along = (np.cumsum([0.0, *np.where(np.arange(side) % 2, corridor, wall)]) for side in open_.shape)
@@ -64,14 +65,14 @@ def maze_polygons(rng: np.random.Generator) -> PolygonMap:
 
 
 def holed_polygons(rng: np.random.Generator) -> PolygonMap:
-    """A square with boxes, circles, thin walls and triangles taken out."""
+    """Draw a square with boxes, circles, thin walls and triangles taken out."""
     side, count = log_uniform(rng, *SIDES), int(rng.integers(1, 15))
     holes = [_hole(rng, side) for _ in range(count)]
     return _placed(rng, shapely.box(0, 0, side, side) - shapely.union_all(holes))
 
 
 def touching_polygons(rng: np.random.Generator) -> PolygonMap:
-    """Obstacles that share corners and edges with each other and with the border."""
+    """Draw obstacles that share corners and edges with each other and with the border."""
     side, count = log_uniform(rng, *SIDES), int(rng.integers(4, 12))
     taken = np.argwhere(rng.random((count, count)) < rng.uniform(0.05, 0.35))
     step = side / count
@@ -80,13 +81,13 @@ def touching_polygons(rng: np.random.Generator) -> PolygonMap:
 
 
 def several_parts(rng: np.random.Generator) -> PolygonMap:
-    """Parts of free space that do not meet."""
+    """Draw parts of free space that do not meet."""
     side, gap = log_uniform(rng, *SIDES), log_uniform(rng, 1e-6, 1.0)
     parts = [affinity.translate(_room(rng, side), i * (side + gap), 0) for i in range(rng.integers(2, 4))]
     return _placed(rng, shapely.union_all(parts))
 
 
-#: The makers of maps by their names.
+#: Functions that draw maps, by name.
 MAPS: dict[str, Callable[[np.random.Generator], Map]] = {
     "boxes grid": boxes_grid, "noise grid": noise_grid, "maze grid": maze_grid, "maze polygons": maze_polygons,
     "holed polygons": holed_polygons, "touching polygons": touching_polygons, "several parts": several_parts,
@@ -94,7 +95,7 @@ MAPS: dict[str, Callable[[np.random.Generator], Map]] = {
 
 
 def placed(free: shapely.Geometry, origin: Pose) -> PolygonMap:
-    """Polygons turned about (0, 0) and then moved there; what rounding spoils is mended."""
+    """Rotate polygons about (0, 0) and move them to the origin; repair what rounding makes invalid."""
     x, y, yaw = origin
     c, s = math.cos(yaw), math.sin(yaw)
     free = affinity.affine_transform(free, [c, -s, s, c, x, y])
@@ -128,18 +129,18 @@ def _hole(rng: np.random.Generator, side: float) -> shapely.Geometry:
 
 
 def _maze(rng: np.random.Generator, rows: int, columns: int) -> np.ndarray:
-    """(2 rows + 1, 2 columns + 1) bool: what is open of a maze with a way from everywhere to everywhere."""
+    """Draw a connected maze; return (2 rows + 1, 2 columns + 1) bool, True where it is open."""
     open_ = np.zeros((2 * rows + 1, 2 * columns + 1), bool)
-    way = [(0, 0)]
+    stack = [(0, 0)]
     open_[1, 1] = True
-    while way:
-        row, column = way[-1]
+    while stack:
+        row, column = stack[-1]
         steps = [(a, b) for a, b in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1))
                  if 0 <= a < rows and 0 <= b < columns and not open_[2 * a + 1, 2 * b + 1]]
         if not steps:
-            way.pop()
+            stack.pop()
             continue
         a, b = steps[rng.integers(len(steps))]
         open_[2 * a + 1, 2 * b + 1] = open_[row + a + 1, column + b + 1] = True
-        way.append((a, b))
+        stack.append((a, b))
     return open_

@@ -1,4 +1,4 @@
-"""Random problems for `dubins_rrt campaign`, of many kinds; a number and a seed always give the same one."""
+"""Random problems for `dubins_rrt campaign`, of many kinds; a seed and a number always give the same problem."""
 
 import math
 from collections.abc import Callable
@@ -14,17 +14,17 @@ from dubins_rrt_ros.planning.maps.model import FREE_UP_TO
 
 from .maps import MAPS, log_uniform, placed, random_origin
 
-#: What a vehicle that just passes has to spare on either side, and what one that just fails lacks on both together [m].
+#: Room to spare on either side of a vehicle that just passes, and width that one lacks that just fails [m].
 TO_SPARE, LACKING = 0.0011, 2e-6
-#: How far poses are from touching an obstacle [m].
+#: Gaps of poses that nearly touch an obstacle [m].
 GAPS = 0.0, 1e-7, 1e-4, 4e-4, 6e-4, 0.001, 0.0011
-#: So many poses are drawn at a time, among which free ones are looked for.
+#: Number of poses drawn at a time, among which free ones are chosen.
 POSES = 40
-#: How many samples most problems are given, and a few.
+#: Range of samples of most problems, and number for a few.
 SAMPLES, MANY_SAMPLES = (20, 400), 3000
-#: The time limit of most problems, which is never reached, and of some, which is [s].
+#: Time limit of most problems, which is never reached, and range of those of some, which is [s].
 AMPLE_TIME, SHORT_TIME = 60.0, (0.001, 0.05)
-#: Footprints of reach 1 or a little less: x ahead of the reference point and y beside it.
+#: Footprints with a circumscribed radius of about 1: x ahead of the reference point, y to its left.
 OUTLINES = {
     "centred": [[1, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]],
     "car": [[1, 0.25], [-0.25, 0.25], [-0.25, -0.25], [1, -0.25]],
@@ -38,12 +38,12 @@ OUTLINES = {
 
 @dataclass(frozen=True)
 class Trial:
-    """A problem, how to plan it, and what is known of it.
+    """A problem, its settings, and what is known of it.
 
     Attributes:
-        kind: how it was made.
-        fits: True where the vehicle can drive the shortest curve from start to goal, False where there is no path; None where
-            nothing is known.
+        kind: the name of its maker in KINDS.
+        fits: True if the vehicle can drive the shortest curve from start to goal, False if there is no path, None if nothing is
+            known.
     """
 
     kind: str
@@ -53,14 +53,14 @@ class Trial:
 
 
 def random_trial(seed: int, number: int) -> Trial:
-    """The problem of this number."""
+    """Make the problem of this number."""
     rng = np.random.default_rng((seed, number))
     kind = str(rng.choice(list(KINDS), p=list(SHARES)))
     return replace(KINDS[kind](rng), kind=kind)
 
 
 def random_settings(rng: np.random.Generator, scale: float) -> Settings:
-    """Of all planners and samplers, mostly with few samples; where the longest edge is limited, to about `scale` [m]."""
+    """Draw settings of all planners and samplers, mostly with few samples; limited steps are of about `scale` [m]."""
     hurried = rng.random() < 0.03
     samples = 100_000 if hurried else MANY_SAMPLES if rng.random() < 0.02 else int(log_uniform(rng, *SAMPLES))
     return Settings(
@@ -73,43 +73,45 @@ def random_settings(rng: np.random.Generator, scale: float) -> Settings:
 
 
 def _on_map(make: Callable[[np.random.Generator], Map]) -> Callable[[np.random.Generator], Trial]:
-    """A maker of problems on such maps, between poses that are free if there are such."""
+    """Return a maker of problems on such maps, between free poses if there are any."""
 
     def make_trial(rng: np.random.Generator) -> Trial:
-        map = make(rng)
-        asked = Problem(map, Vehicle(), _some_pose(map, rng), _some_pose(map, rng), allow_unknown=bool(rng.random() < 0.3))
-        room = max(float(clearances(_poses(map, rng)[:, :2], asked).max()), 1e-3)
+        world_map = make(rng)
+        asked = Problem(world_map, Vehicle(), _some_pose(world_map, rng), _some_pose(world_map, rng),
+                        allow_unknown=bool(rng.random() < 0.3))
+        room = max(float(clearances(_poses(world_map, rng)[:, :2], asked).max()), 1e-3)
         asked = replace(asked, vehicle=_vehicle(rng, room), **_tolerances(rng, room))
-        poses = _poses(map, rng)
+        poses = _poses(world_map, rng)
         free = np.flatnonzero(pose_gaps(poses, asked) > 0)
         start, goal = poses[rng.choice(free if len(free) > 1 else POSES, 2, replace=False)].tolist()
-        scale = max(asked.vehicle.turning_radius, _side(map) / 50)
+        scale = max(asked.vehicle.turning_radius, _side(world_map) / 50)
         return Trial("", replace(asked, start=start, goal=goal), random_settings(rng, scale))
 
     return make_trial
 
 
 def _anywhere(rng: np.random.Generator) -> Trial:
-    """Between poses in obstacles, and outside the map, too."""
+    """Make a problem between poses that may be in obstacles or outside the map."""
     trial = _any_map(rng)
     poses = _poses(trial.problem.map, rng, beyond=0.3)
     poses[:, 2] += math.tau * rng.integers(-1000, 1000, POSES)
-    ends = {name: poses[i].tolist() for i, name in enumerate(("start", "goal")) if rng.random() < 0.7}
+    ends: dict[str, Any] = {name: poses[i].tolist() for i, name in enumerate(("start", "goal")) if rng.random() < 0.7}
     return replace(trial, problem=replace(trial.problem, **ends))
 
 
 def _touching(rng: np.random.Generator) -> Trial:
-    """Between poses where the vehicle nearly touches, or just touches, an obstacle."""
+    """Make a problem between poses at which the vehicle touches, or nearly touches, an obstacle."""
     trial = _any_map(rng)
     problem = trial.problem
     for name in ("start", "goal"):
         if rng.random() < 0.7:
-            problem = replace(problem, **{name: _moved_up(problem, getattr(problem, name), float(rng.choice(GAPS)), rng)})
+            moved: dict[str, Any] = {name: _moved_up(problem, getattr(problem, name), float(rng.choice(GAPS)), rng)}
+            problem = replace(problem, **moved)
     return replace(trial, problem=problem)
 
 
 def _near(rng: np.random.Generator) -> Trial:
-    """To a goal beside the start, or to the start itself."""
+    """Make a problem whose goal is next to the start, or the start itself."""
     trial = _any_map(rng)
     x, y, theta = trial.problem.start
     away = log_uniform(rng, 1e-10, 1.0) * trial.problem.vehicle.turning_radius if rng.random() < 0.9 else 0.0
@@ -119,21 +121,22 @@ def _near(rng: np.random.Generator) -> Trial:
 
 
 def _gap(rng: np.random.Generator) -> Trial:
-    """Straight through a gap between two walls, the only way, that is just wide enough or just not."""
+    """Make a problem whose only way is straight through a gap that is just wide enough, or just not."""
     fits, width = bool(rng.random() < 0.5), log_uniform(rng, 0.05, 5.0)
     half = width / 2 - TO_SPARE if fits else width / 2 + LACKING / 2
-    vehicle, reach = _of_half_width(rng, half)
+    vehicle, size = _vehicle_of_half_width(rng, half)
     kind, origin = rng.choice(["grid", "polygons"]), random_origin(rng)
     cells = int(rng.integers(1, 5))
     thick = log_uniform(rng, 0.001, 2.0) * width if kind == "polygons" else int(rng.integers(1, 6)) * width / cells
-    away = thick / 2 + reach * rng.uniform(1.01, 2)
-    sides = 2 * (away + 1.2 * reach), 2 * rng.uniform(1.2, 3) * reach + width
+    away = thick / 2 + size * rng.uniform(1.01, 2)
+    sides = 2 * (away + 1.2 * size), 2 * rng.uniform(1.2, 3) * size + width
+    world_map: Map
     if kind == "grid":
-        map = _gap_grid(width, cells, thick, sides, origin, wall=int(rng.choice([OCCUPIED, UNKNOWN, FREE_UP_TO + 1])))
+        world_map = _gap_grid(width, cells, thick, sides, origin, wall=int(rng.choice([OCCUPIED, UNKNOWN, FREE_UP_TO + 1])))
     else:
-        map = _gap_polygons(width, thick, sides, origin)
-    problem = Problem(map, vehicle, _at(origin, -away, 0.0, 0.0), _at(origin, away, 0.0, 0.0))
-    return Trial("", problem, random_settings(rng, reach), fits)
+        world_map = _gap_polygons(width, thick, sides, origin)
+    problem = Problem(world_map, vehicle, _at(origin, -away, 0.0, 0.0), _at(origin, away, 0.0, 0.0))
+    return Trial("", problem, random_settings(rng, size), fits)
 
 
 def _gap_polygons(width: float, thick: float, sides: tuple[float, float], origin: Pose) -> Map:
@@ -143,23 +146,23 @@ def _gap_polygons(width: float, thick: float, sides: tuple[float, float], origin
 
 
 def _gap_grid(width: float, cells: int, thick: float, sides: tuple[float, float], origin: Pose, wall: int) -> Map:
-    """So many cells are as wide as the gap; those of the walls hold the value `wall`."""
+    """Make a grid whose gap is `cells` wide; the cells of its walls hold the value `wall`."""
     resolution = width / cells
     through = round(thick / resolution)
-    ahead, beside = math.ceil(sides[0] / 2 / resolution), math.ceil(sides[1] / 2 / resolution)
-    data = np.zeros((2 * beside + cells, 2 * ahead + through), np.int8)
+    ahead, across = math.ceil(sides[0] / 2 / resolution), math.ceil(sides[1] / 2 / resolution)
+    data = np.zeros((2 * across + cells, 2 * ahead + through), np.int8)
     data[:, ahead:ahead + through] = wall
-    data[beside:beside + cells, ahead:ahead + through] = FREE
-    corner = _at(origin, -(ahead + through / 2) * resolution, -(beside + cells / 2) * resolution, 0.0)
+    data[across:across + cells, ahead:ahead + through] = FREE
+    corner = _at(origin, -(ahead + through / 2) * resolution, -(across + cells / 2) * resolution, 0.0)
     return GridMap(data, resolution, corner)
 
 
 def _corner(rng: np.random.Generator) -> Trial:
-    """Round a bend past a post, which the outer corner or the inner side just clears, or just does not."""
+    """Make a problem round a bend past a post that the outer corner or the inner side just clears, or just does not."""
     fits, outer, side = bool(rng.random() < 0.5), bool(rng.random() < 0.5), int(rng.choice([-1, 1]))
     half = log_uniform(rng, 0.05, 2.0)
-    vehicle, reach = _of_half_width(rng, half, chamfered=False)
-    radius = half + reach * log_uniform(rng, 0.3, 5.0)
+    vehicle, size = _vehicle_of_half_width(rng, half, chamfered=False)
+    radius = half + size * log_uniform(rng, 0.3, 5.0)
     vehicle = replace(vehicle, turning_radius=radius)
     farthest = max((abs(x) for x, _ in vehicle.footprint), default=0.0)
     gap = TO_SPARE if fits else -LACKING / 2
@@ -167,27 +170,27 @@ def _corner(rng: np.random.Generator) -> Trial:
     bearing, half_turn = rng.uniform(-math.pi, math.pi), rng.uniform(0.3, 1.4)
     origin = random_origin(rng)
     post = away * math.cos(bearing), away * math.sin(bearing)
-    map = (_post_grid if rng.random() < 0.5 else _post_polygons)(rng, post, bearing if outer else bearing + math.pi,
-                                                                 3 * radius + 3 * reach, origin)
+    make: Callable[..., Map] = _post_grid if rng.random() < 0.5 else _post_polygons
+    world_map = make(rng, post, bearing if outer else bearing + math.pi, 3 * radius + 3 * size, origin)
     # The centre of the turn is (0, 0) before everything is moved to the origin.
     angles = bearing - side * half_turn, bearing + side * half_turn
     start, goal = (_at(origin, radius * math.cos(a), radius * math.sin(a), a + side * math.pi / 2) for a in angles)
-    return Trial("", Problem(map, vehicle, start, goal), random_settings(rng, reach), True if fits else None)
+    return Trial("", Problem(world_map, vehicle, start, goal), random_settings(rng, size), True if fits else None)
 
 
-def _post_polygons(rng: np.random.Generator, tip: tuple[float, float], bearing: float, reach: float, origin: Pose) -> Map:
-    """A pointed post whose tip is there, and which lies beyond in that direction."""
-    long = reach * log_uniform(rng, 0.001, 0.01)
+def _post_polygons(rng: np.random.Generator, tip: tuple[float, float], bearing: float, half_side: float, origin: Pose) -> Map:
+    """Make a map with a pointed post that extends from its tip in the direction of the bearing."""
+    long = half_side * log_uniform(rng, 0.001, 0.01)
     ahead = np.array([math.cos(bearing), math.sin(bearing)])
-    beside = rng.uniform(0.05, 0.5) * np.array([-ahead[1], ahead[0]])
-    post = shapely.Polygon([tip, tip + long * (ahead + beside), tip + long * (ahead - beside)])
-    return placed(shapely.box(-reach, -reach, reach, reach) - post, origin)
+    left = rng.uniform(0.05, 0.5) * np.array([-ahead[1], ahead[0]])
+    post = shapely.Polygon([tip, tip + long * (ahead + left), tip + long * (ahead - left)])
+    return placed(shapely.box(-half_side, -half_side, half_side, half_side) - post, origin)
 
 
-def _post_grid(rng: np.random.Generator, tip: tuple[float, float], bearing: float, reach: float, origin: Pose) -> Map:
-    """A single cell whose corner is there, and which lies beyond in that direction."""
+def _post_grid(rng: np.random.Generator, tip: tuple[float, float], bearing: float, half_side: float, origin: Pose) -> Map:
+    """Make a map with a single cell that extends from its corner, the tip, in the direction of the bearing."""
     cells = int(rng.integers(200, 400))
-    resolution = 2 * reach / cells
+    resolution = 2 * half_side / cells
     data = np.zeros((cells, cells), np.int8)
     data[cells // 2, cells // 2] = OCCUPIED
     x, y, yaw = _at(origin, *tip, bearing - math.pi / 4)
@@ -195,8 +198,8 @@ def _post_grid(rng: np.random.Generator, tip: tuple[float, float], bearing: floa
     return GridMap(data, resolution, _at((x, y, yaw), -back, -back, 0.0))
 
 
-def _of_half_width(rng: np.random.Generator, half: float, chamfered: bool = True) -> tuple[Vehicle, float]:
-    """A disc, or a polygon no narrower in any direction, so wide to either side [m], and how far it reaches."""
+def _vehicle_of_half_width(rng: np.random.Generator, half: float, chamfered: bool = True) -> tuple[Vehicle, float]:
+    """Make a disc of this half-width, or a polygon around it; return the vehicle and its circumscribed radius [m]."""
     turning_radius = max(half * log_uniform(rng, 0.5, 5.0), 0.001)
     if rng.random() < 0.4:
         return Vehicle(turning_radius, half), half
@@ -204,12 +207,12 @@ def _of_half_width(rng: np.random.Generator, half: float, chamfered: bool = True
     cut = half * 0.2 if chamfered and rng.random() < 0.5 else 0.0
     nose = [[front - cut, half], [front, half - cut], [front, cut - half], [front - cut, -half]] if cut else [
         [front, half], [front, -half]]
-    vehicle = Vehicle(turning_radius, footprint=_text([*nose, [-back, -half], [-back, half]]))
+    vehicle = Vehicle(turning_radius, footprint=_footprint([*nose, [-back, -half], [-back, half]]))
     return vehicle, vehicle.robot_radius
 
 
 def _vehicle(rng: np.random.Generator, room: float) -> Vehicle:
-    """One that has a chance of moving on a map, whose largest clearance is about `room` [m]."""
+    """Make a vehicle that has a chance of moving on a map whose largest clearance is about `room` [m]."""
     turning_radius = max(room * log_uniform(rng, 0.05, 3.0), 0.001)
     kind = rng.choice(["disc", "point", "polygon", "random polygon"], p=[0.35, 0.1, 0.4, 0.15])
     if kind in ("disc", "point"):
@@ -220,11 +223,11 @@ def _vehicle(rng: np.random.Generator, room: float) -> Vehicle:
         bearings = np.sort(rng.uniform(0, math.tau, 2)) + np.array([[0.0], [2.1], [4.2]]) + rng.uniform(0, math.tau)
         bearings = np.sort(np.unique(np.round(bearings.ravel() % math.tau, 3)))
         corners = np.column_stack([np.cos(bearings), np.sin(bearings)]) * rng.uniform(0.15, 1, (len(bearings), 1))
-    return Vehicle(turning_radius, footprint=_text((room * log_uniform(rng, 0.05, 1.8) * corners).tolist()))
+    return Vehicle(turning_radius, footprint=_footprint((room * log_uniform(rng, 0.05, 1.8) * corners).tolist()))
 
 
 def _tolerances(rng: np.random.Generator, room: float) -> dict[str, Any]:
-    """The goal's tolerances, of which there are none at most times."""
+    """Draw the tolerances of the goal, mostly none."""
     if rng.random() < 0.7:
         return {}
     return {"goal_tolerance_xy": float(rng.choice([0.0, room * log_uniform(rng, 0.01, 1.0)])),
@@ -235,23 +238,24 @@ def _any_map(rng: np.random.Generator) -> Trial:
     return _on_map(MAPS[str(rng.choice(list(MAPS)))])(rng)
 
 
-def _side(map: Map) -> float:
-    return float(np.ptp(map.corners(), axis=0).max())
+def _side(world_map: Map) -> float:
+    return float(np.ptp(world_map.corners(), axis=0).max())
 
 
-def _some_pose(map: Map, rng: np.random.Generator) -> Pose:
-    return tuple(_poses(map, rng)[0].tolist())
+def _some_pose(world_map: Map, rng: np.random.Generator) -> Pose:
+    x, y, theta = _poses(world_map, rng)[0].tolist()
+    return x, y, theta
 
 
-def _poses(map: Map, rng: np.random.Generator, beyond: float = 0.0) -> np.ndarray:
-    """(POSES, 3) poses on a map, or outside too by a share of its sides."""
-    corners = map.corners()
+def _poses(world_map: Map, rng: np.random.Generator, beyond: float = 0.0) -> np.ndarray:
+    """Draw (POSES, 3) poses on a map, and outside it up to a share `beyond` of its sides."""
+    corners = world_map.corners()
     shares = rng.uniform(-beyond, 1 + beyond, (POSES, 2))
     return np.column_stack([corners[0] + shares @ (corners[[1, 3]] - corners[0]), rng.uniform(-math.pi, math.pi, POSES)])
 
 
 def _moved_up(problem: Problem, pose: Pose, gap: float, rng: np.random.Generator) -> Pose:
-    """The pose moved in some direction to where the vehicle has just this gap or hardly more."""
+    """Move a pose in a random direction to where the vehicle has this gap, or hardly more."""
     bearing = rng.uniform(-math.pi, math.pi)
 
     def moved(by: float) -> Pose:
@@ -265,16 +269,16 @@ def _moved_up(problem: Problem, pose: Pose, gap: float, rng: np.random.Generator
 
 
 def _at(origin: Pose, x: float, y: float, theta: float) -> Pose:
-    """A pose in the frame of another."""
+    """Return the pose that has these coordinates in the frame of `origin`."""
     c, s = math.cos(origin[2]), math.sin(origin[2])
     return origin[0] + c * x - s * y, origin[1] + s * x + c * y, origin[2] + theta
 
 
-def _text(corners: list[list[float]]) -> str:
-    return str([[float(x), float(y)] for x, y in corners])
+def _footprint(corners: list[list[float]]) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in corners)
 
 
-#: The makers of problems by their kinds, and how often each is asked.
+#: Functions that make problems, by kind, and the probability of each.
 KINDS = {**{name: _on_map(make) for name, make in MAPS.items()}, "anywhere": _anywhere, "touching": _touching, "near": _near,
           "gap": _gap, "corner": _corner}
 SHARES = [0.5 / len(MAPS)] * len(MAPS) + [0.06, 0.12, 0.06, 0.16, 0.1]

@@ -1,4 +1,4 @@
-"""`dubins_rrt figures`: draw the figures of the documentation."""
+"""`dubins_rrt figures`: draw the figures of the documentation, from what the planner itself computes."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLDER = "docs/figures"
-#: The formats, and their pixels to the inch. In .svg only trees and fields have any: enough for a page, in half the bytes.
+#: Formats, with their resolution [pixels/inch]. In .svg only trees and colour maps are pixels, enough for a page.
 FORMATS = {".svg": 110, ".png": 160}
 
 
@@ -26,12 +26,12 @@ def add_arguments(parser: Parser) -> None:
                     "are right for this version.",
         notes="Drawn again by the same versions of this package and matplotlib, the files are the same to the byte.",
         examples=["dubins_rrt figures --out figures"], exit_status="0 done, 2 wrong usage, 130 interrupted")
-    parser.add_argument("--out", metavar="DIR", default=FOLDER, help=f"where to write; default {FOLDER}")
+    parser.add_argument("--out", metavar="DIR", default=FOLDER, help=f"folder to write to; default {FOLDER}")
     add_json_flag(parser, "the files' names")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw, say what was written, and return the exit status."""
+    """Draw the figures, report, and return the exit status."""
     check_folder(arguments.json)
     require_matplotlib("evaluation")
     folder, figures = Path(arguments.out), all_figures()
@@ -44,14 +44,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def all_figures() -> "dict[str, Callable[[], Figure]]":
-    """What draws each figure, by the name of its files without their ending."""
-    from . import geometry as figures_geometry  # here, for matplotlib takes long to import
+    """Return the functions that draw the figures, by the names of their files without the ending."""
+    from . import geometry as figures_geometry  # here, since matplotlib is slow to import
     from . import search as figures_search
     return figures_geometry.FIGURES | figures_search.FIGURES
 
 
 def _written(figures: "dict[str, Callable[[], Figure]]", folder: Path) -> Iterator[list[str]]:
-    """The names of each figure's files as soon as they are written."""
+    """Yield the names of each figure's files as soon as they are written."""
     for name, drawn in figures.items():
         yield save(drawn(), folder / name)
 

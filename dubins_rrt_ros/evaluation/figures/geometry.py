@@ -1,9 +1,9 @@
-"""Figures of docs/dubins_curves.md and docs/collisions.md, drawn of what the planner's own code computes."""
+"""Figures of docs/dubins_curves.md and docs/collisions.md, drawn from what the planner's own code computes."""
 
 import math
 from collections.abc import Callable
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -21,29 +21,29 @@ from dubins_rrt_ros.planning.collision.footprint import cover
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import candidates, shortest
 
-#: The width of a figure [inch], and the sizes of its letters.
+#: Width of a figure [inch], and font sizes.
 WIDTH, TITLE, LABEL = 7.2, 13, 12
-#: The poses of a drawn curve are this far apart [m]: 2 mm off it at most.
+#: Distance between the poses of a drawn curve [m]: 2 mm off it at most.
 SPACING = 0.1
-#: Poses so close that all six words have a curve, as the two with three turns have for close poses only; the radius is 1 m.
+#: Poses so close that all six words have a curve, which LRL and RLR have for close poses only; the radius is 1 m.
 FROM, TO = (0.0, 0.0, math.radians(30)), (3.0, 1.0, math.radians(180))
 TURN = {"L": 1, "S": 0, "R": -1}
 #: A room with obstacles, and a curve of a disc that passes between them [m].
 ROOM = PolygonMap(shapely.difference(shapely.box(0, 0, 12, 6), shapely.union_all([shapely.Polygon(corners) for corners in (
     [(3.4, 6.0), (3.2, 3.5), (4.6, 2.9), (5.6, 4.2), (5.2, 6.0)], [(5.2, 0.0), (5.5, 1.9), (6.9, 2.4), (7.4, 0.0)],
     [(8.9, 2.5), (9.9, 1.2), (10.5, 2.0), (9.8, 3.0)])])))
-WALK, DISC = shortest((1.0, 2.4, -1.1), (11.1, 3.4, -1.2), 1.5), Vehicle(turning_radius=1.5, robot_radius=0.4)
-#: A car whose rear axle is 0.9 m from its rear; by how much it is made wider, how tightly it turns and how far it drives [m].
+CURVE, DISC = shortest((1.0, 2.4, -1.1), (11.1, 3.4, -1.2), 1.5), Vehicle(turning_radius=1.5, robot_radius=0.4)
+#: Footprint of a car whose rear axle is 0.9 m from its rear; margin, turning radius and length of a straight arc [m].
 CAR, WIDER, TIGHT, STRAIGHT = ((3.6, 0.9), (-0.9, 0.9), (-0.9, -0.9), (3.6, -0.9)), 0.3, 5.0, 1.5
 
 
-class Look(NamedTuple):
-    """A look at the clearance on the way along a curve.
+class Query(NamedTuple):
+    """A query of the clearance on the way along a curve.
 
     Attributes:
         point: (x, y) [m].
-        clearance: what was found: the exact one [m], or where that is enough a lower bound of it.
-        is_exact: whether the raster's bound was not enough.
+        clearance: the exact clearance [m], or a lower bound of it where that suffices.
+        is_exact: True if the bound of the raster did not suffice.
     """
 
     point: tuple[float, float]
@@ -52,7 +52,7 @@ class Look(NamedTuple):
 
 
 def six_words() -> Figure:
-    """The curve of each word between the same two poses."""
+    """Draw the curve of each word between the same two poses."""
     curves = candidates(FROM, TO, 1.0)
     best = min(curves.values(), key=lambda curve: curve.length)
     figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
@@ -74,13 +74,13 @@ def _add_legend(figure: Figure, handles: list[Artist]) -> None:
 
 
 def _draw_word(axes: Axes, curve: DubinsCurve, colour: str) -> None:
-    """A curve, the circles of its turns, and their letters."""
+    """Draw a curve, the circles of its turns, and their letters."""
     for turn, begin, length in zip(curve.word, accumulate(curve.lengths, initial=0.0), curve.lengths, strict=False):
         side = TURN[turn]
         if side:
-            axes.add_patch(Circle(_aside(curve.pose_at(begin), side * curve.radius), curve.radius, fill=False, color=UNKNOWN,
+            axes.add_patch(Circle(_left_of(curve.pose_at(begin), side * curve.radius), curve.radius, fill=False, color=UNKNOWN,
                                   linewidth=1, linestyle="--"))
-        axes.text(*_aside(curve.pose_at(begin + length / 2), -0.3 * (side or 1)), turn, fontsize=LABEL, weight="bold",
+        axes.text(*_left_of(curve.pose_at(begin + length / 2), -0.3 * (side or 1)), turn, fontsize=LABEL, weight="bold",
                   color=colour, ha="center", va="center")
     poses = curve.poses(SPACING)
     axes.plot(poses[:, 0], poses[:, 1], color=colour, linewidth=2.6, solid_capstyle="round")
@@ -91,14 +91,14 @@ def _draw_word(axes: Axes, curve: DubinsCurve, colour: str) -> None:
     _draw_arrow(axes, curve.end[:2], _ahead(curve.end, 0.9), GOAL)
 
 
-def _aside(pose: Pose, distance: float) -> tuple[float, float]:
-    """The point at a distance to the left of a pose."""
+def _left_of(pose: Pose, distance: float) -> tuple[float, float]:
+    """Return the point at a distance to the left of a pose."""
     x, y, theta = pose
     return x - distance * math.sin(theta), y + distance * math.cos(theta)
 
 
 def _ahead(pose: Pose, distance: float) -> tuple[float, float]:
-    """The point at a distance ahead of a pose."""
+    """Return the point at a distance ahead of a pose."""
     x, y, theta = pose
     return x + distance * math.cos(theta), y + distance * math.sin(theta)
 
@@ -108,18 +108,18 @@ def _draw_arrow(axes: Axes, tail: tuple[float, float], tip: tuple[float, float],
 
 
 def collision_walk() -> Figure:
-    """The walk by clearance along a curve."""
-    looks = walk(ClearanceField(ROOM), WALK, DISC.robot_radius)
-    exact = sum(look.is_exact for look in looks)
+    """Draw conservative advancement along a curve."""
+    queries = advance(ClearanceField(ROOM), CURVE, DISC.robot_radius)
+    exact = sum(query.is_exact for query in queries)
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.add_subplot()
     frame(axes, ROOM)
-    axes.set_title(f"{len(looks)} looks find {WALK.length:.1f} m of curve free; {exact} need the exact distance", fontsize=TITLE,
-                   weight="bold", loc="left")
+    axes.set_title(f"{len(queries)} looks find {CURVE.length:.1f} m of curve free; {exact} need the exact distance",
+                   fontsize=TITLE, weight="bold", loc="left")
     for is_exact, colour in ((False, GOAL), (True, CULPRIT)):
-        _draw_looks(axes, [look for look in looks if look.is_exact == is_exact], colour)
-    draw_on(axes, Drawing(ROOM, WALK.start, WALK.end, DISC, np.empty((0, 2, 2)), WALK.poses(SPACING), "", ""))
-    discs = {"marker": "o", "markersize": 13, "linestyle": "none"}
+        _draw_queries(axes, [query for query in queries if query.is_exact == is_exact], colour)
+    draw_on(axes, Drawing(ROOM, CURVE.start, CURVE.end, DISC, np.empty((0, 2, 2)), CURVE.poses(SPACING), "", ""))
+    discs: dict[str, Any] = {"marker": "o", "markersize": 13, "linestyle": "none"}
     _add_legend(figure, [Line2D([], [], color=PATH, linewidth=2.2, label="curve"),
                          Patch(facecolor=PATH, alpha=0.3, label="vehicle"),
                          Line2D([], [], color=GOAL, markerfacecolor=TREE, **discs, label="bound from the raster"),
@@ -127,11 +127,11 @@ def collision_walk() -> Figure:
     return figure
 
 
-def _draw_looks(axes: Axes, looks: list[Look], colour: str) -> None:
-    """The discs that hold no obstacle, under the path, and their middles on it."""
-    for look in looks:
-        _draw_disc(axes, look.point, look.clearance, colour)
-    x, y = np.transpose([look.point for look in looks])
+def _draw_queries(axes: Axes, queries: list[Query], colour: str) -> None:
+    """Draw the discs that hold no obstacle, under the path, and their centres on it."""
+    for query in queries:
+        _draw_disc(axes, query.point, query.clearance, colour)
+    x, y = np.transpose([query.point for query in queries])
     axes.plot(x, y, "o", color=colour, markeredgecolor=FREE, markersize=6, zorder=5)
 
 
@@ -139,29 +139,30 @@ def _draw_disc(axes: Axes, middle: tuple[float, float], radius: float, colour: s
     axes.add_patch(Circle(middle, radius, facecolor=to_rgba(colour, 0.12), edgecolor=colour, linewidth=1.2, zorder=2))
 
 
-def walk(field: ClearanceField, curve: DubinsCurve, need: float) -> list[Look]:
-    """Where the walk of `planning/_kernels/clearance.py` looks along a curve that shall keep the clearance `need` [m].
+def advance(field: ClearanceField, curve: DubinsCurve, required_clearance: float) -> list[Query]:
+    """List the queries of the conservative advancement in `planning/_kernels/clearance.py` along a curve.
 
-    It ends with a look that finds less than that and the margin, or with the end of the curve.
+    It ends with a query that finds less than the required clearance [m] and the margin, or at the end of the curve.
     """
-    looks, s = [], 0.0
+    queries: list[Query] = []
+    s = 0.0
     while s <= curve.length:
-        looks.append(_look(field, curve.pose_at(s), need))
-        if looks[-1].clearance < need + CLEARANCE_MARGIN:
-            return looks
-        s += looks[-1].clearance - need + CLEARANCE_MARGIN / 2
-    return [*looks, _look(field, curve.end, need)]
+        queries.append(_query(field, curve.pose_at(s), required_clearance))
+        if queries[-1].clearance < required_clearance + CLEARANCE_MARGIN:
+            return queries
+        s += queries[-1].clearance - required_clearance + CLEARANCE_MARGIN / 2
+    return [*queries, _query(field, curve.end, required_clearance)]
 
 
-def _look(field: ClearanceField, pose: Pose, need: float) -> Look:
+def _query(field: ClearanceField, pose: Pose, required_clearance: float) -> Query:
     point = np.array(pose[:2])
     bound = float(np.asarray(field.kernel.field)[field.cells(point)])
-    is_exact = bound < need + CLEARANCE_MARGIN + field.kernel.resolution
-    return Look(pose[:2], float(field.at(point)) if is_exact else bound, is_exact)
+    is_exact = bound < required_clearance + CLEARANCE_MARGIN + field.kernel.resolution
+    return Query(pose[:2], float(field.at(point)) if is_exact else bound, is_exact)
 
 
 def footprint_cover() -> Figure:
-    """How a car is held against the obstacles: roughly and exactly, in a turn and straight on."""
+    """Draw the collision checks of a car: approximate and exact, in a turn and straight on."""
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True).flat
     for axes, draw in zip(panels, (_draw_discs, _draw_wider, _draw_turn, _draw_sweep), strict=True):
@@ -174,7 +175,7 @@ def footprint_cover() -> Figure:
 
 
 def _draw_discs(axes: Axes) -> str:
-    """The discs that cover the car."""
+    """Draw the discs that cover the car."""
     found = cover(CAR)
     for x, y, radius, _ in found.discs:
         _draw_disc(axes, (x, y), radius, GOAL)
@@ -182,14 +183,14 @@ def _draw_discs(axes: Axes) -> str:
 
 
 def _draw_wider(axes: Axes) -> str:
-    """The car made wider."""
+    """Draw the car with a margin around it."""
     corners = cover(CAR).corners
     _draw_shape(axes, corners[:, :2] + WIDER * corners[:, 2:], GOAL)
     return f"{100 * WIDER:.0f} cm wider, corners cut off"
 
 
 def _draw_turn(axes: Axes) -> str:
-    """How far its corners move per metre of the reference point."""
+    """Draw the motion of its corners per metre of the reference point."""
     moves = [(1 - y / TIGHT, x / TIGHT) for x, y in CAR]
     for (x, y), (along, across) in zip(CAR, moves, strict=True):
         _draw_arrow(axes, (x, y), (x + along, y + across), GOAL)
@@ -197,7 +198,7 @@ def _draw_turn(axes: Axes) -> str:
 
 
 def _draw_sweep(axes: Axes) -> str:
-    """What it covers on a straight arc."""
+    """Draw the area that it sweeps on a straight arc."""
     last = [(x + STRAIGHT, y) for x, y in CAR]
     _draw_shape(axes, shapely.get_coordinates(shapely.MultiPoint([*CAR, *last]).convex_hull), GOAL)
     return "straight on: all at once"

@@ -1,4 +1,4 @@
-"""The documentation's figures of the search, all in the maze: trees, bounds, and how fast paths become shorter.
+"""Figures of the search for docs/, all in the maze: trees, bounds, and convergence.
 
 Seeds and sample budgets are fixed, and no time limit ends a run, so that they are the same however fast the machine is.
 """
@@ -6,7 +6,7 @@ Seeds and sample budgets are fixed, and no time limit ends a run, so that they a
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps, patheffects
@@ -30,29 +30,29 @@ from dubins_rrt_ros.cli.common.plots import (
     frame,
     planner_title,
 )
-from dubins_rrt_ros.planning import ClearanceField, Plan, Problem, Progress, Settings, plan
+from dubins_rrt_ros.planning import ClearanceField, Path, Plan, Problem, Progress, Settings, plan
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 
-from ..paper.runs import MAZE, MOST, NO_LIMIT, UNLIMITED, Run, planned, problem_in
+from ..paper.runs import MAZE, MOST, NO_LIMIT, UNLIMITED, PaperRun, planned, problem_in
 
-#: With it RRT needs just as many samples as the paper draws for its pictures, 500.
+#: A seed with which RRT needs as many samples as the paper draws for its pictures, 500.
 SEED = 5
-#: The poses of a drawn path are this far apart, the tree's turns are drawn in pieces so long, and so far apart are the points
-#: at which colours and contours are worked out [m].
+#: Distance between the poses of a drawn path, length of the segments of the tree's arcs, and distances between the points at
+#: which colours and contours are computed [m].
 SPACING, PIECE, PIXEL, STEP = 0.2, 0.1, 0.05, 0.1
-#: The sides of a picture of the maze, of one with a bar of colours, of two pictures, and of the curves [inch].
+#: Sides of a picture of the maze, of one with a colour bar, of two pictures, and of the convergence plot [inch].
 PICTURE, COLOURED, PICTURES, CURVES = (6.6, 5.8), (6.6, 5.3), (9.6, 4.3), (7.2, 4.4)
-#: The sizes of letters.
+#: Font sizes.
 TITLE, NOTE = 13, 11
-#: What stands for infinity where contours are drawn, which know none [m].
+#: Substitute for infinity where contours are drawn, which take none [m].
 BEYOND = 1e3
-#: Where no shorter path leads, and the first path, which the final one may hide.
+#: Colours of where no shorter path leads, and of the first path, which the final one may hide.
 RULED_OUT, FIRST = "#dfe2e6", "#000000"
-#: Lines on the colours of the cost-to-go, and what they are edged with, that they be seen on all of these.
-EDGED = {"linewidth": 2.2, "path_effects": [patheffects.withStroke(linewidth=4.4, foreground="black")]}
-#: What is compared: the settings, from how many samples on, the colour and the shape.
-COMPARED = {
+#: Lines over the colours of the cost-to-go, with an edge that makes them visible on all of them.
+EDGED: dict[str, Any] = {"linewidth": 2.2, "path_effects": [patheffects.withStroke(linewidth=4.4, foreground="black")]}
+#: The planners compared: settings, number of samples to begin with, colour and marker.
+COMPARED: dict[str, tuple[Settings, int, str, str]] = {
     "plain RRT*": (Settings(informed=False, shortcut=False, heading_sampling="uniform"), 300, START, "o"),
     "informed": (Settings(shortcut=False), 1, GOAL, "s"),
     "informed, with shortcuts": (Settings(), 1, PATH, "^"),
@@ -64,8 +64,8 @@ class Bounds(NamedTuple):
     """The lower bounds of a problem.
 
     Attributes:
-        to_goal, from_start: no way to the goal, or from the start, is shorter.
-        least: no path is shorter [m].
+        to_goal, from_start: lower bounds of the length to the goal, and from the start.
+        least: lower bound of the length of a path [m].
     """
 
     to_goal: CostToGo
@@ -73,19 +73,19 @@ class Bounds(NamedTuple):
     least: float
 
     def over(self, points: np.ndarray) -> np.ndarray:
-        """(n,) lengths that no path over (n, 2) points falls below [m]; infinite where none leads."""
+        """Return (n,) lower bounds of the length of a path through (n, 2) points [m]; infinite where there is none."""
         return self.from_start.at(points) + self.to_goal.at(points)
 
-    def over_lattice(self, problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(rows, columns) x and y of points all over a map, and what `over` says of them, at most BEYOND [m]."""
-        points = _lattice(problem, STEP)
+    def over_grid(self, problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return (rows, columns) x and y of points all over a map, and their lower bounds, at most BEYOND [m]."""
+        points = _grid(problem, STEP)
         return points[..., 0], points[..., 1], np.minimum(self.over(points.reshape(-1, 2)), BEYOND).reshape(points.shape[:2])
 
 
 def rrt_and_rrt_star() -> Figure:
-    """The trees and paths of Algorithms 1 and 2, grown of the same samples."""
-    rrt = planned(Run(MAZE, "rrt", MOST, "uniform", UNLIMITED, SEED))
-    rrt_star = planned(Run(MAZE, "rrt_star", rrt.samples, "uniform", UNLIMITED, SEED))
+    """Draw the trees and paths of Algorithms 1 and 2, grown from the same samples."""
+    rrt = planned(PaperRun(MAZE, "rrt", MOST, "uniform", UNLIMITED, SEED))
+    rrt_star = planned(PaperRun(MAZE, "rrt_star", rrt.samples, "uniform", UNLIMITED, SEED))
     figure = Figure(figsize=PICTURES, layout="constrained")
     for axes, found in zip(figure.subplots(1, 2, sharey=True), (rrt, rrt_star), strict=True):
         _frame(axes, f"{planner_title(found.settings.planner)}: {found.length:.2f} m",
@@ -96,15 +96,15 @@ def rrt_and_rrt_star() -> Figure:
 
 
 def informed_search() -> Figure:
-    """What the bounds leave of the maze to the search, its first path and its last."""
+    """Draw what the bounds leave of the maze to the search, with the first path and the last."""
     first, final = first_and_final()
     known = bounds_of(final.problem)
     figure, axes = _picture(PICTURE, f"Informed search: from {first.length:.2f} m to {final.length:.2f} m",
                             f"{final.samples} samples; no path is shorter than {known.least:.2f} m")
     _draw_plan(axes, final)
     draw_map(axes, final.problem.map, RULED_OUT)  # over the white of the plan
-    axes.contourf(*known.over_lattice(final.problem), levels=[0, final.length], colors=[FREE], zorder=1.5)
-    poses = first.path.poses(SPACING)
+    axes.contourf(*known.over_grid(final.problem), levels=[0, final.length], colors=[FREE], zorder=1.5)
+    poses = path_of(first).poses(SPACING)
     axes.plot(poses[:, 0], poses[:, 1], "--", color=FIRST, linewidth=1.6, zorder=4.5)
     figure.legend(handles=[
         Line2D([], [], color=FIRST, linestyle="--", linewidth=1.6, label="first path, of hybrid A*"),
@@ -116,16 +116,16 @@ def informed_search() -> Figure:
 
 
 def bounds() -> Figure:
-    """The cost-to-go over the maze, and over where a path shorter than the best may lead."""
+    """Draw the cost-to-go over the maze, and the region through which a shorter path may lead."""
     _, final = first_and_final()
     problem, known = final.problem, bounds_of(final.problem)
     figure, axes = _picture(COLOURED, "Cost-to-go, and where a shorter path may lead",
                             f"best path {final.length:.2f} m, lower bound {known.least:.2f} m")
     draw_map(axes, problem.map)
     _draw_cost_to_go(axes, known, problem)
-    region = axes.contour(*known.over_lattice(problem), levels=[final.length], colors="white", zorder=3)
+    region = axes.contour(*known.over_grid(problem), levels=[final.length], colors="white", zorder=3)
     region.set(**EDGED)
-    poses = final.path.poses(SPACING)
+    poses = path_of(final).poses(SPACING)
     axes.plot(poses[:, 0], poses[:, 1], color=CULPRIT, zorder=4, **EDGED)
     draw_poses(axes, problem.start, problem.goal, problem.vehicle)
     figure.legend(handles=[Line2D([], [], color=CULPRIT, label="best path", **EDGED),
@@ -135,7 +135,7 @@ def bounds() -> Figure:
 
 
 def convergence() -> Figure:
-    """How far above the lower bound paths are, over samples."""
+    """Draw the excess of paths over the lower bound, over samples."""
     problem = problem_in(MAZE)
     least = bounds_of(problem).least
     figure = Figure(figsize=CURVES, layout="constrained")
@@ -155,34 +155,45 @@ def convergence() -> Figure:
     return figure
 
 
-#: What draws each figure, by the name of its files without their ending.
+#: Functions that draw the figures, by the names of their files without the ending.
 FIGURES: dict[str, Callable[[], Figure]] = {
     drawn.__name__: drawn for drawn in (rrt_and_rrt_star, informed_search, bounds, convergence)}
 
 
 def first_and_final() -> tuple[Plan, Plan]:
-    """The plan in the maze when the first path was found, and that in the end."""
+    """Plan in the maze; return the plan when the first path was found, and the final one."""
     first: list[Plan] = []
 
-    def note(progress: Progress) -> None:
+    def keep_first(progress: Progress) -> None:
         if progress.improved and not first:
             first.append(progress.snapshot())
 
-    final = plan(problem_in(MAZE), Settings(planning_time=NO_LIMIT, seed=SEED), on_progress=note)
+    final = plan(problem_in(MAZE), Settings(planning_time=NO_LIMIT, seed=SEED), on_progress=keep_first)
     return first[0], final
 
 
+def path_of(found: Plan) -> Path:
+    """Return the path of a plan that has one.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if found.path is None:
+        raise ValueError(found.message)
+    return found.path
+
+
 def bounds_of(problem: Problem) -> Bounds:
-    """The bounds of a problem, of known space alone."""
+    """Compute the bounds of a problem without unknown space."""
     field = ClearanceField(problem.map)
     to_goal, from_start = (make(problem, field).make_bound() for make in (CostToGo.to_goal, CostToGo.from_start))
     return Bounds(to_goal, from_start, lower_bound(problem, to_goal))
 
 
 def lengths(problem: Problem, settings: Settings, marks: Sequence[int]) -> np.ndarray:
-    """(marks, seeds) lengths of the paths with so many samples [m]; NaN where there is none.
+    """Return (marks, seeds) lengths of the paths after these numbers of samples [m]; NaN where there is none.
 
-    Each is planned from the beginning: reports on the way come when the time wants it, these always after the same samples.
+    Each is planned from the beginning: progress is reported at certain times, not at certain samples.
     """
     def length(samples: int, seed: int) -> float:
         found = plan(problem, replace(settings, samples=samples, seed=seed, planning_time=NO_LIMIT))
@@ -191,15 +202,15 @@ def lengths(problem: Problem, settings: Settings, marks: Sequence[int]) -> np.nd
     return np.array([[length(mark, seed) for seed in SEEDS] for mark in marks])
 
 
-def _lattice(problem: Problem, step: float) -> np.ndarray:
-    """(rows, columns, 2) points all over a map, a step apart [m]."""
+def _grid(problem: Problem, step: float) -> np.ndarray:
+    """Return (rows, columns, 2) points all over a map, a step apart [m]."""
     corners = problem.map.corners()
     x, y = (np.arange(low + step / 2, high, step) for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
 def _picture(sides: tuple[float, float], title: str, note: str) -> tuple[Figure, Axes]:
-    """A figure with one picture of the maze."""
+    """Make a figure with one picture of the maze."""
     figure = Figure(figsize=sides, layout="constrained")
     axes = figure.add_subplot()
     _frame(axes, title, note)
@@ -210,31 +221,31 @@ def _frame(axes: Axes, title: str, note: str) -> None:
     """Fit axes to the maze, and write a title and a note above."""
     frame(axes, problem_in(MAZE).map)
     axes.tick_params(labelsize=NOTE)
-    axes.xaxis.label.set_size(NOTE)
-    axes.yaxis.label.set_size(NOTE)
+    axes.xaxis.label.set_fontsize(NOTE)
+    axes.yaxis.label.set_fontsize(NOTE)
     axes.set_title(title, fontsize=TITLE, weight="bold", loc="left", pad=22)
     axes.text(0, 1.02, note, transform=axes.transAxes, fontsize=NOTE, color="#444444")
 
 
 def _draw_plan(axes: Axes, found: Plan) -> None:
     """Draw map, tree and path."""
-    problem, tree, path = found.problem, found.tree.segments(PIECE), found.path.poses(SPACING)
+    problem, tree, path = found.problem, found.tree.segments(PIECE), path_of(found).poses(SPACING)
     draw_on(axes, Drawing(problem.map, problem.start, problem.goal, problem.vehicle, tree, path, "", ""))
     for lines in axes.collections:
         lines.set_antialiased(False)  # as pixels of one colour they take a fifth of the room in a file
 
 
 def _draw_cost_to_go(axes: Axes, known: Bounds, problem: Problem) -> None:
-    """Draw the cost-to-go in colours, one for each metre, which a bar beside the axes tells."""
-    points = _lattice(problem, PIXEL)
+    """Draw the cost-to-go in colours, one for each metre, with a colour bar."""
+    points = _grid(problem, PIXEL)
     cost = np.ma.masked_invalid(known.to_goal.at(points.reshape(-1, 2)).reshape(points.shape[:2]))
     most = math.ceil(cost.max())
     left, low = points[0, 0] - PIXEL / 2
     right, high = points[-1, -1] + PIXEL / 2
     view = axes.axis()
-    field = axes.imshow(cost, cmap=colormaps["cividis"].resampled(most), vmin=0, vmax=most, origin="lower",
+    image = axes.imshow(cost, cmap=colormaps["cividis"].resampled(most), vmin=0, vmax=most, origin="lower",
                         extent=(left, right, low, high), interpolation="none", zorder=2)
     axes.axis(view)
-    bar = axes.figure.colorbar(field, cax=axes.inset_axes((1.03, 0, 0.04, 1)))
+    bar = axes.figure.colorbar(image, cax=axes.inset_axes((1.03, 0, 0.04, 1)))
     bar.set_label("way to the goal, at least [m]", fontsize=NOTE)
     bar.ax.tick_params(labelsize=NOTE)

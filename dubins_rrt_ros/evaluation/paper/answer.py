@@ -1,4 +1,4 @@
-"""The answer to the paper's open question in two paragraphs: what was found, and why; all figures are of the runs."""
+"""The answer to the paper's open question in two paragraphs, what was found and why, with the figures of the runs."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -34,12 +34,12 @@ along the way around obstacles, which fits in all three. This planner's defaults
 
 
 def found(measured: Measured) -> dict[str, Any]:
-    """The values of FOUND."""
+    """Return the values of FOUND."""
     return {"limit": LIMITED, "seeds": measured.seeds, **_lengths(measured), **_firsts(measured)}
 
 
 def why(measured: Measured) -> dict[str, Any]:
-    """The values of WHY."""
+    """Return the values of WHY."""
     return {"limit": LIMITED, **_shapes(measured), **_stuck(measured)}
 
 
@@ -55,7 +55,7 @@ def _lengths(measured: Measured) -> dict[str, str]:
 
 
 def _firsts(measured: Measured) -> dict[str, str | int]:
-    """Of the first paths."""
+    """Return the figures of the first paths."""
     def samples(headings: str = "uniform", step_size: float = UNLIMITED) -> str:
         return _listed(map(_count, _medians(measured, lambda run: run.samples_to_first, "rrt_star", headings, step_size)))
 
@@ -73,8 +73,8 @@ def _firsts(measured: Measured) -> dict[str, str | int]:
 
 
 def _shapes(measured: Measured) -> dict[str, str]:
-    """Of how many curves the paths are and by how much they turn, with uniform headings."""
-    shapes = {}
+    """Return the number of curves of the paths and how much they turn, with uniform headings."""
+    shapes: dict[str, str] = {}
     for ending, step_size in (("", UNLIMITED), ("_limited", LIMITED)):
         curves, turned = (_median(measured, figure, MAZE, "rrt_star", "uniform", step_size)
                           for figure in (lambda run: run.curves, lambda run: run.turned))
@@ -85,14 +85,14 @@ def _shapes(measured: Measured) -> dict[str, str]:
 
 
 def _stuck(measured: Measured) -> dict[str, str | int]:
-    """How far RRT came in the maze where it found no path, without a limit and with headings towards the goal."""
-    reaches = [run.reach for run in measured.of(MAZE, "rrt", headings="goal") if not run.solved]
-    return {"unsolved": len(reaches), "reach": metres(max(reaches, default=math.inf))}
+    """Return how far RRT came in the maze without a path, with unlimited steps and headings towards the goal."""
+    farthest = [run.reach for run in measured.of(MAZE, "rrt", headings="goal") if not run.solved]
+    return {"unsolved": len(farthest), "reach": metres(max(farthest, default=math.inf))}
 
 
 def _medians(measured: Measured, figure: Callable[[Outcome], float], planner: str, headings: str, step_size: float
              ) -> list[float]:
-    """The median of a figure in each environment."""
+    """Return the median of a figure in each environment."""
     return [_median(measured, figure, environment, planner, headings, step_size) for environment in ENVIRONMENTS]
 
 
@@ -106,7 +106,7 @@ def _count(value: float) -> str:
 
 
 def _compared(length: float, other: float) -> str:
-    """How much longer or shorter one length is than another."""
+    """Write how much longer or shorter one length is than another."""
     if not math.isfinite(length - other):
         return "not to be compared"
     return f"{100 * abs(length / other - 1):.1f} % {'longer' if length > other else 'shorter'}"

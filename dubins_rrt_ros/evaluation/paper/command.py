@@ -1,4 +1,4 @@
-"""`dubins_rrt paper`: measure again what the paper measured, and answer its open question."""
+"""`dubins_rrt paper`: run the paper's experiments again with many seeds, and answer its open question in a report."""
 
 import argparse
 import contextlib
@@ -12,7 +12,7 @@ from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, wr
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
-from .runs import Measured, all_runs, outcomes
+from .runs import Measured, Outcome, PaperRun, all_runs, outcomes
 
 SEEDS = 30
 REPORT, LINES = "report.md", "runs.jsonl"
@@ -29,15 +29,15 @@ def add_arguments(parser: Parser) -> None:
               "seconds; then open quick/report.md.",
         examples=["dubins_rrt paper --seeds 2 --out quick", "dubins_rrt paper --json answer.json"],
         exit_status="0 done, 2 wrong usage, 130 interrupted")
-    parser.add_argument("--out", metavar="DIR", default="paper_results", help="where to write; default paper_results")
-    parser.add_argument("--seeds", metavar="N", type=int, default=SEEDS, help=f"use the seeds 0 to N-1; default {SEEDS}")
+    parser.add_argument("--out", metavar="DIR", default="paper_results", help="folder to write to; default paper_results")
+    parser.add_argument("--seeds", metavar="N", type=int, default=SEEDS, help=f"number of seeds, from 0 to N-1; default {SEEDS}")
     parser.add_argument("--jobs", metavar="J", type=int, default=os.cpu_count() or 1,
-                        help="run in J processes; default as many as there are cores")
+                        help="number of processes; default: the number of cores")
     add_json_flag(parser, "the report's tables and its answer")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, draw, write, and return the exit status."""
+    """Measure, draw, write the report, and return the exit status."""
     for name in ("seeds", "jobs"):
         if getattr(arguments, name) < 1:
             raise UsageError(f"--{name} is {getattr(arguments, name)}; give 1 or more")
@@ -51,8 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _measured(file: Path, seeds: int, jobs: int) -> Measured:
-    """What came of all runs, each written to the file as soon as it is there."""
-    runs, done = all_runs(seeds), {}
+    """Make all runs, each written to the file as soon as it is done."""
+    runs = all_runs(seeds)
+    done: dict[PaperRun, Outcome] = {}
     with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(outcomes(runs, jobs)) as running:
         for run, outcome in with_bar(running, len(runs), " runs"):
             done[run] = outcome
@@ -62,8 +63,8 @@ def _measured(file: Path, seeds: int, jobs: int) -> Measured:
 
 
 def _report(folder: Path, measured: Measured, arguments: argparse.Namespace, begin: float) -> None:
-    """Draw the figures and write the report of what was begun then."""
-    from .figures import drawn_figures, figure_count  # here, for matplotlib takes long to import
+    """Draw the figures and write the report of a measurement that began at `begin`."""
+    from .figures import drawn_figures, figure_count  # here, since matplotlib is slow to import
     from .report import headline, to_document, to_markdown
     for _ in with_bar(drawn_figures(folder, measured), figure_count(), " figures"):
         pass

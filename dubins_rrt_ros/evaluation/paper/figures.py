@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,23 +36,23 @@ from .runs import (
 FORMATS = (".png", ".svg")
 #: Two colours of Okabe and Ito's palette, and shapes for those who see neither.
 COLOURS, SHAPES = {"rrt": GOAL, "rrt_star": PATH}, {"rrt": "o", "rrt_star": "s"}
-#: The poses of a drawn path are this far apart, and the tree's lines turn in pieces so long, which are 1 mm off their arc [m].
+#: Distance between the poses of a drawn path, and length of the segments of the tree's arcs, 1 mm off them at most [m].
 SPACING, PIECE = 0.05, 0.1
-#: The sides of the figure of convergence, and those of a panel of the question's [inch].
+#: Sides of the convergence plot, and of a panel of the question's figure [inch].
 CURVES, PANEL = (7.2, 4.4), (3.6, 2.6)
 TICKS, TIMES = (50, 100, 200, 500, 1000, 2000, 3000), (1, 10, 100)
 HEADINGS_TICKS = ("uniform", "towards\nthe goal", "along\nthe field")
-#: How far from the tick of its headings a limited step stands to the right and none to the left, and RRT* from RRT.
-ASIDE, APART = 0.09, 0.2
+#: Offset from a tick to a limited step (right) and to an unlimited one (left), and between RRT and RRT*.
+STEP_OFFSET, PLANNER_OFFSET = 0.09, 0.2
 
 
 def figure_count() -> int:
-    """How many figures are drawn."""
+    """Return the number of figures."""
     return len(PICTURES) + 2
 
 
 def drawn_figures(folder: Path, measured: Measured) -> Iterator[str]:
-    """Draw all figures into a folder in all formats, and give the name of each as soon as it is there."""
+    """Draw all figures to a folder in all formats, and yield the name of each as soon as it is there."""
     for environment, planner, samples in PICTURES:
         name = picture_name(environment, planner, samples)
         _draw_picture(folder / name, measured, environment, planner, samples)
@@ -83,7 +84,7 @@ def _draw_picture(path: Path, measured: Measured, environment: str, planner: str
 
 
 def _convergence(measured: Measured) -> Figure:
-    """Length over samples in the maze."""
+    """Draw length over samples in the maze."""
     figure = Figure(figsize=CURVES, layout="constrained")
     axes = figure.add_subplot()
     decorate(axes)
@@ -99,7 +100,7 @@ def _convergence(measured: Measured) -> Figure:
 
 
 def _draw_curve(axes: Axes, planner: str, lengths: list[list[float]]) -> None:
-    """A line and a band over MARKS, each from where on it is finite, and the planner's name at their end."""
+    """Draw a line and a band over MARKS, where they are finite, and the planner's name at their end."""
     low, middle, high = (np.array([quantile(values, share) for values in lengths]) for share in (0.25, 0.5, 0.75))
     colour, solved = COLOURS[planner], np.isfinite(middle)
     axes.fill_between(MARKS, low, high, where=np.isfinite(high), color=colour, alpha=0.2, linewidth=0)
@@ -110,7 +111,7 @@ def _draw_curve(axes: Axes, planner: str, lengths: list[list[float]]) -> None:
 
 
 def _question(measured: Measured) -> Figure:
-    """A column of panels for each environment: time to the first path, and the lengths that RRT and RRT* come to."""
+    """Draw a column of panels for each environment: time to the first path, and the lengths of RRT and RRT*."""
     rows: list[tuple[str, tuple[str, ...], Callable[[Outcome], float]]] = [
         ("first path [ms]", PLANNERS, lambda run: 1000 * run.time_to_first),
         ("RRT: length [m]", ("rrt",), lambda run: run.length),
@@ -131,7 +132,7 @@ def _draw_panel(axes: Axes, measured: Measured, environment: str, planners: tupl
                 ) -> None:
     decorate(axes)
     for planner, step_size in product(planners, STEPS):
-        place = 0.0 if len(planners) == 1 else APART if planner == "rrt_star" else -APART
+        place = 0.0 if len(planners) == 1 else PLANNER_OFFSET if planner == "rrt_star" else -PLANNER_OFFSET
         _draw_kind(axes, measured, environment, planner, step_size, place, figure_of)
     axes.margins(y=0.2)
 
@@ -150,10 +151,10 @@ def _name_ticks(panels: np.ndarray) -> None:
 
 def _draw_kind(axes: Axes, measured: Measured, environment: str, planner: str, step_size: float, place: float,
                figure_of: Callable[[Outcome], float]) -> None:
-    """Medians and quartiles of the runs of a planner with a step size, and how many found a path where not all did."""
+    """Draw medians and quartiles of the runs of a planner with a step size, and how many found a path if not all did."""
     for i, headings in enumerate(HEADINGS):
         runs = measured.of(environment, planner, headings=headings, step_size=step_size)
-        x, solved = i + place + (ASIDE if step_size else -ASIDE), sum(run.solved for run in runs)
+        x, solved = i + place + (STEP_OFFSET if step_size else -STEP_OFFSET), sum(run.solved for run in runs)
         low, middle, high = (quantile(map(figure_of, runs), share) for share in (0.25, 0.5, 0.75))
         if math.isfinite(high):
             axes.plot([x, x], [low, high], color=COLOURS[planner], linewidth=2)
@@ -164,8 +165,8 @@ def _draw_kind(axes: Axes, measured: Measured, environment: str, planner: str, s
                       fontsize=11, weight="bold", ha="center", va="top", rotation=90)
 
 
-def _marker(planner: str, step_size: float) -> dict:
-    """Full without a limit to the step, hollow with one."""
+def _marker(planner: str, step_size: float) -> dict[str, Any]:
+    """Return the style of a marker: filled for unlimited steps, hollow for limited ones."""
     return {"marker": SHAPES[planner], "color": COLOURS[planner], "markersize": 8, "markeredgewidth": 2, "linestyle": "none",
             "markerfacecolor": "white" if step_size else COLOURS[planner]}
 

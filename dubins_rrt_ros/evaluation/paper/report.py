@@ -32,7 +32,7 @@ from .runs import (
 
 #: The paper's table, of one run in a maze whose coordinates it does not give [m].
 PAPERS = {500: (22.54, 22.24), 1000: (22.54, 22.19), 2000: (22.54, 20.75), 3000: (22.54, 20.26)}
-#: How long a line of the report's text is at most, in letters.
+#: Maximum number of letters in a line of text.
 WIDTH = 130
 HEADINGS_TITLES = {"uniform": "uniform", "goal": "towards the goal", "field": "along the field"}
 
@@ -66,14 +66,14 @@ NOTE = "The two paragraphs were written from the medians of 30 seeds; the figure
 
 
 def headline(measured: Measured) -> str:
-    """What the paper's table comes to, in a line."""
+    """Write the result of the paper's table in a line."""
     rrt, star = (median(run.length for run in measured.of(MAZE, planner)) for planner in ("rrt", "rrt_star"))
     return (f"{MAZE}, {MOST} samples, {measured.seeds} seeds: RRT {metres(rrt)} m, RRT* {metres(star)} m, {_gain(rrt, star)} "
             f"shorter; the paper: {_gain(*PAPERS[MOST])}")
 
 
 def to_markdown(measured: Measured, jobs: int, seconds: float) -> str:
-    """The report of runs that took so long in so many processes."""
+    """Write the report of runs that took `seconds` in `jobs` processes."""
     at_once = "one process" if jobs == 1 else f"{jobs} processes at once"
     made = (f"Made by `dubins_rrt paper --seeds {measured.seeds} --jobs {jobs}`, version {__version__}: {len(measured.outcomes)} "
             f"runs and all figures in {seconds:.0f} s. Every run is a line of `runs.jsonl`.")
@@ -90,7 +90,7 @@ def to_markdown(measured: Measured, jobs: int, seconds: float) -> str:
 
 
 def to_document(measured: Measured) -> dict[str, Any]:
-    """The report's tables and its answer as what JSON can hold, but for what is infinite; seconds and metres."""
+    """Return the report's tables and its answer for JSON, infinite figures included; in seconds and metres."""
     table = [{"samples": samples, "paper": dict(zip(PLANNERS, PAPERS[samples], strict=True)),
               **{planner: _figures(measured.of(MAZE, planner, samples)) for planner in PLANNERS}} for samples in TABLE]
     question = [{"environment": environment, "heading_sampling": headings, "step_size": step_size,
@@ -108,7 +108,7 @@ def _figures(runs: list[Outcome]) -> dict[str, Any]:
 
 
 def _prose(template: str, **values: Any) -> str:
-    """Paragraphs with their values, wrapped."""
+    """Fill in the values of paragraphs, and wrap them."""
     paragraphs = template.format(**values).strip().split("\n\n")
     return "\n\n".join(textwrap.fill(text, WIDTH, break_long_words=False, break_on_hyphens=False) for text in paragraphs)
 
@@ -118,7 +118,7 @@ def _image(name: str, title: str) -> str:
 
 
 def _pictures() -> list[str]:
-    """The pictures in tables of two side by side."""
+    """Write the pictures in tables of two side by side."""
     pairs = [PICTURES[i:i + 2] for i in range(0, len(PICTURES), 2)]
     return [table([_picture_title(*picture) for picture in pair],
                   [[_image(picture_name(*picture), _picture_title(*picture)) for picture in pair]]) for pair in pairs]
@@ -143,7 +143,7 @@ def _papers_row(measured: Measured, samples: int) -> list[str]:
 
 
 def _convergence(measured: Measured) -> dict[str, Any]:
-    """The values of CONVERGENCE_TEXT."""
+    """Return the values of CONVERGENCE_TEXT."""
     by_mark = [[run.length for run in measured.of(MAZE, "rrt_star", mark)] for mark in MARKS]
     steps = [(before, after) for pair in pairwise(by_mark) for before, after in zip(*pair, strict=True)]
     rrt, star = (median(run.length for run in measured.of(MAZE, planner)) for planner in ("rrt", "rrt_star"))
@@ -177,5 +177,5 @@ def _lengths(runs: list[Outcome]) -> str:
 
 
 def _gain(rrt: float, star: float) -> str:
-    """By what share RRT* is shorter."""
+    """Write by how much RRT* is shorter."""
     return f"{100 * (1 - star / rrt):.1f} %" if math.isfinite(rrt) and math.isfinite(star) else "-"

@@ -1,9 +1,9 @@
-"""The processes of `dubins_rrt campaign`: each works at one task after the other, and what kills it or never ends is noticed."""
+"""Worker processes for campaigns and for the paper: a task that kills its process, or never ends, is reported."""
 
 import contextlib
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
@@ -12,14 +12,14 @@ from typing import Any
 _CONTEXT = get_context("spawn")
 
 
-def results(work: Callable[[Any], Any], tasks: Iterable[Any], jobs: int, limit: float,
-            when_lost: Callable[[Any, str], Any]) -> Iterator[Any]:
-    """What `work` makes of each task, in any order, in `jobs` processes.
+def run_in_processes(work: Callable[[Any], Any], tasks: Iterable[Any], jobs: int, limit: float,
+            when_lost: Callable[[Any, str], Any]) -> Generator[Any, None, None]:
+    """Yield what `work` returns for each task, in any order, from `jobs` processes.
 
     Args:
         work: a function of a module.
-        limit: a task that takes longer is given up, and its process ended [s].
-        when_lost: makes the result of a task, and of a sentence on what happened, where its process died or was ended.
+        limit: time limit of a task [s]; beyond it the process is ended.
+        when_lost: makes the result of a task whose process died or was ended, from it and a sentence on what happened.
     """
     tasks = iter(tasks)
     workers = [_Worker(work, limit, task) for task in islice(tasks, jobs)]
@@ -27,7 +27,7 @@ def results(work: Callable[[Any], Any], tasks: Iterable[Any], jobs: int, limit: 
         while workers:
             ready = wait([worker.pipe for worker in workers], timeout=1.0)
             for worker in [worker for worker in workers if worker.pipe in ready or worker.is_late]:
-                done, result = worker.take() if worker.pipe in ready else (False, f"no answer within {limit:g} s")
+                done, result = worker.receive() if worker.pipe in ready else (False, f"no answer within {limit:g} s")
                 yield result if done else when_lost(worker.task, result)
                 workers.remove(worker)
                 workers += [worker.next(task, alive=done) for task in islice(tasks, 1)]
@@ -42,8 +42,8 @@ class _Worker:
     """A process with a task.
 
     Attributes:
-        task: what it works at.
-        pipe: is ready when the result is there, or the process has died.
+        task: the task under way.
+        pipe: the connection that is ready when there is a result, or the process has died.
     """
 
     def __init__(self, work: Callable[[Any], Any], limit: float, task: Any):
@@ -56,11 +56,11 @@ class _Worker:
 
     @property
     def is_late(self) -> bool:
-        """Whether it takes longer than the limit."""
+        """True if the task takes longer than the limit."""
         return time.monotonic() > self._due
 
-    def take(self) -> tuple[bool, Any]:
-        """Whether there is a result, and that, or what happened."""
+    def receive(self) -> tuple[bool, Any]:
+        """Return True and the result, or False and what happened."""
         try:
             return True, self.pipe.recv()
         except (EOFError, ConnectionError):
@@ -68,7 +68,7 @@ class _Worker:
             return False, f"the process died with status {self._process.exitcode}"
 
     def next(self, task: Any, alive: bool) -> "_Worker":
-        """The worker for the next task: this one, or where it is not alive a fresh one."""
+        """Return the worker for the next task: this one, or a fresh one if it is not alive."""
         if not alive:
             return _Worker(self._work, self._limit, task)
         self._give(task)
@@ -82,7 +82,7 @@ class _Worker:
 
     def _give(self, task: Any) -> None:
         self.task, self._due = task, time.monotonic() + self._limit
-        with contextlib.suppress(ConnectionError):  # of a process that has died; take() tells
+        with contextlib.suppress(ConnectionError):  # of a process that has died; receive() says so
             self.pipe.send(task)
 
 
