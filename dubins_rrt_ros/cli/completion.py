@@ -10,7 +10,8 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.maps.files import MAP_ENDINGS
+from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, maps_directory
 
 from .commands import COMMANDS, load_arguments
 from .common.parser import Parser, describe
@@ -117,7 +118,8 @@ def _flags(parser: argparse.ArgumentParser) -> list[str]:
 
 def _list_maps() -> str:
     """Return the shell command that lists the installed maps at the time it runs."""
-    return f"command ls {shlex.quote(str(maps_directory()))} 2>/dev/null | sed -n 's/[.]yaml$//p; /[.]geojson$/p; /[.]wkt$/p'"
+    edits = [f"s/[.]{ending[1:]}$//p" if ending == OMITTED_ENDING else f"/[.]{ending[1:]}$/p" for ending in MAP_ENDINGS]
+    return f"command ls {shlex.quote(str(maps_directory()))} 2>/dev/null | sed -n '{'; '.join(edits)}'"
 
 
 def _bash(parsers: Mapping[str, Parser]) -> Iterator[str]:

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
+from dubins_rrt_ros.planning.maps.files import POLYGON_ENDINGS
 
 from .common.example import ENDS, MAP
 from .common.output import check_folder, words_for, write_document
@@ -23,7 +24,7 @@ def add_arguments(parser: Parser) -> None:
                     "any part of it, even a corner, touches an obstacle.",
         examples=[f"dubins_rrt render {MAP}.geojson --resolution 0.1 --out grids", f"dubins_rrt plan grids/{MAP}.yaml {ENDS}"],
         exit_status="0 done, 2 wrong usage")
-    parser.add_argument("map", metavar="MAP", help="a polygon map (.geojson, .wkt), or an installed one's name")
+    parser.add_argument("map", metavar="MAP", help=f"a polygon map ({', '.join(POLYGON_ENDINGS)}), or an installed one's name")
     parser.add_argument("--resolution", metavar="m", type=float, default=0.05,
                         help="side of a cell [m]; default 0.05")
     parser.add_argument("--out", metavar="DIR", help="folder to write to; default: that of the polygon map, or the current "
@@ -57,7 +58,7 @@ def _polygons(source: Path, resolution: float) -> PolygonMap:
         raise UsageError(f"--resolution is {resolution:g}; it must be a positive number of metres")
     polygon_map = load_map(source)
     if not isinstance(polygon_map, PolygonMap):
-        raise UsageError(f"{source} is a grid already; give a polygon map (.geojson or .wkt)")
+        raise UsageError(f"{source} is a grid already; give a polygon map ({' or '.join(POLYGON_ENDINGS)})")
     low, high = polygon_map.corners()[[0, 2]]
     cells = math.prod(float(side) / resolution + 2 for side in high - low)
     if cells > MAX_CELLS:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
-from dubins_rrt_ros.planning.maps.files import MAX_MAP_CELLS
-from dubins_rrt_ros.planning.maps.locate import find_map, maps_directory
+from dubins_rrt_ros.planning.maps.files import MAP_ENDINGS, MAX_MAP_CELLS
+from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 
 from .documents import read_json
@@ -39,7 +39,7 @@ class LoadedRequest(NamedTuple):
 def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
     """Give `parser` the argument MAP, which is returned, and the flag --max-map-cells."""
     action = parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
-                                 help="a map file (.yaml, .geojson, .wkt) or an installed map's name, such as maze")
+                                 help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"maximum number of cells of a grid; default {MAX_MAP_CELLS}")
     return action
@@ -54,8 +54,8 @@ def find_map_or_suggest(name: str) -> Path:
     try:
         return find_map(name)
     except MapNotFound as error:
-        own = {file.stem: file.name for ending in ("wkt", "geojson") for file in maps_directory().glob(f"*.{ending}")}
-        own |= {file.stem: file.stem for file in maps_directory().glob("*.yaml")}
+        files = sorted(installed_maps(), key=lambda file: file.suffix == OMITTED_ENDING)  # the last of a stem counts
+        own = {file.stem: file.stem if file.suffix == OMITTED_ENDING else file.name for file in files}
         raise MapNotFound(f"{error}{near_miss(Path(name).stem, own.values())}") from None
 
 
@@ -104,7 +104,7 @@ def _same_map(file: str, document: dict[str, Any], max_map_cells: int) -> tuple[
 def _candidates(file: str, name: str) -> Iterator[Path]:
     """Yield where the map of a document may be: as it was named then, next to the document, among the installed maps."""
     base, folder, own = Path(name).name, Path(file).parent, maps_directory()
-    places = (*_named(name), folder / name, folder / base, own / base, own / f"{base}.yaml")
+    places = (*_named(name), folder / name, folder / base, own / base, own / f"{base}{OMITTED_ENDING}")
     return (place for place in dict.fromkeys(places) if os.path.isfile(place))
 
 

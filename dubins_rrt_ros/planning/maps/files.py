@@ -4,7 +4,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import yaml
@@ -110,14 +110,12 @@ def expand_home(path: str | os.PathLike) -> Path:
 
 def _load(path: Path, max_map_cells: int, directory: str) -> GridMap | PolygonMap:
     _check_inside(path, directory)
-    ending, longest = path.suffix.lower(), min(MAX_POLYGON_BYTES, _FEW_POLYGON_BYTES + _POLYGON_BYTES_PER_CELL * max_map_cells)
-    if ending in (".yaml", ".yml"):
-        return _load_grid(path, max_map_cells, directory)
-    if ending in (".geojson", ".json"):
-        return parse_geojson(_read_text(path, longest), path.name)
-    if ending == ".wkt":
-        return parse_wkt(_read_text(path, longest), path.name)
-    raise MapError(f"the ending {ending!r} is of no known kind of map; give a .yaml, .geojson or .wkt file")
+    ending = path.suffix.lower()
+    reader = READERS.get(OTHER_ENDINGS.get(ending, ending))
+    if reader is None:
+        *most, last = MAP_ENDINGS
+        raise MapError(f"the ending {ending!r} is of no known kind of map; give a {', '.join(most)} or {last} file")
+    return reader.read(path, max_map_cells, directory)
 
 
 def _check_inside(path: Path, directory: str) -> None:
@@ -259,3 +257,36 @@ def _cell_values(mode: str, negate: bool, occupied: float, free: float) -> np.nd
         between = np.floor(scaled.astype(float) + 0.5)
     values = np.where(occupancy >= np.float32(occupied), OCCUPIED, between)
     return np.where(occupancy <= np.float32(free), FREE, values).astype(np.int8)
+
+
+def _polygon_reader(parse: Callable[[str, str], PolygonMap]) -> "Reader":
+    def read(path: Path, max_map_cells: int, _directory: str) -> PolygonMap:
+        max_bytes = min(MAX_POLYGON_BYTES, _FEW_POLYGON_BYTES + _POLYGON_BYTES_PER_CELL * max_map_cells)
+        return parse(_read_text(path, max_bytes), path.name)
+
+    return Reader(read, is_grid=False)
+
+
+class Reader(NamedTuple):
+    """A reader of one kind of map file.
+
+    Attributes:
+        read: takes the path, the maximum number of cells and the map directory ("" is any), and returns the map.
+        is_grid: whether its maps are grids; all others are polygons.
+    """
+
+    read: Callable[[Path, int, str], GridMap | PolygonMap]
+    is_grid: bool
+
+
+#: The readers by the ending of their files. Help, completion, installed maps and errors follow from this table.
+READERS = {
+    ".yaml": Reader(_load_grid, is_grid=True),
+    ".geojson": _polygon_reader(parse_geojson),
+    ".wkt": _polygon_reader(parse_wkt),
+}
+#: The endings of map files, and those that stand for one of them.
+MAP_ENDINGS = tuple(READERS)
+OTHER_ENDINGS = {".yml": ".yaml", ".json": ".geojson"}
+#: The endings of polygon maps.
+POLYGON_ENDINGS = tuple(ending for ending, reader in READERS.items() if not reader.is_grid)

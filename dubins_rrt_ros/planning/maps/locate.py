@@ -6,10 +6,12 @@ import sys
 from pathlib import Path
 from urllib.parse import unquote
 
-from .files import expand_home
+from .files import MAP_ENDINGS, expand_home
 from .model import MapNotFound
 
 PACKAGE = "dubins_rrt_ros"
+#: The ending that the name of an installed map may leave out.
+OMITTED_ENDING = ".yaml"
 _URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<host>[^/]*)/?(?P<path>.*)", re.DOTALL)
 
 
@@ -35,6 +37,11 @@ def maps_directory() -> Path:
     return next((folder for folder in folders if folder.is_dir()), folders[-1])
 
 
+def installed_maps() -> list[Path]:
+    """List the files of the package's own maps by name."""
+    return sorted(file for file in maps_directory().glob("*") if file.suffix in MAP_ENDINGS)
+
+
 def find_map(name: str) -> Path:
     """The file of a map.
 
@@ -56,7 +63,7 @@ def find_map(name: str) -> Path:
 
 
 def _choices() -> str:
-    own = sorted(file.name for file in maps_directory().glob("*") if file.suffix in (".yaml", ".geojson", ".wkt"))
+    own = [file.name for file in installed_maps()]
     return ("a path, a file:// or package:// URL, or one of the package's own maps: "
             f"{', '.join(own) or 'none are installed'}")
 
@@ -65,7 +72,7 @@ def _places(name: str) -> list[Path]:
     """Where the map of a name that is no URL may be."""
     path, own = expand_home(name), maps_directory()
     is_own = path.parent in (Path("."), Path("maps"))
-    return [path, own / path.name, own / f"{path.name}.yaml"] if is_own else [path]
+    return [path, own / path.name, own / f"{path.name}{OMITTED_ENDING}"] if is_own else [path]
 
 
 def _path_of(url: re.Match) -> Path:
