@@ -14,13 +14,11 @@ everywhere, and one that keeps `required_clearance + margin` always passes.
 import cython
 
 if cython.compiled:
-    from cython.cimports.dubins_rrt_ros.planning._kernels.distance import left_gap, right_gap
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import UNLIMITED, Pose, drive_from
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
-    from .distance import left_gap, right_gap
     from .dubins import UNLIMITED, Pose, drive_from
 
 
@@ -129,11 +127,19 @@ class Clearance:
             at = after
             row += 1
 
-    def row_of(self, y):
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def row_of(self, y: cython.double) -> cython.int:
         """The row of the raster that holds a y in its frame."""
         return min(cython.cast(cython.int, y / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
 
-    def column_of(self, x):
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def column_of(self, x: cython.double) -> cython.int:
         """The column of the raster that holds an x in its frame."""
         return min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
 
@@ -160,7 +166,11 @@ class GridClearance(Clearance):
         Clearance.__init__(self, field, resolution, origin, margin)
         self.row_gap = row_gap
 
-    def squared_across(self, x, row, column):
+    @cython.cfunc
+    @cython.nogil
+    @cython.inline
+    @cython.exceptval(check=False)
+    def squared_across(self, x: cython.double, row: cython.int, column: cython.int) -> cython.double:
         """Return the squared distance along x to the nearest occupied square of a row."""
         row_gap: cython.int = self.row_gap[row, column]
         if row_gap == 0:
@@ -300,3 +310,24 @@ def squared_to_segment(x: cython.double, y: cython.double, edges: cython.double[
     px -= along * dx
     py -= along * dy
     return px * px + py * py
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def left_gap(row_gap: cython.int) -> cython.int:
+    """Return how many cells away the next blocked cell to the left is, at least, of what `distance.measure_row_gaps` packs.
+
+    The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
+    """
+    return (row_gap >> 2) + (row_gap & 1)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def right_gap(row_gap: cython.int) -> cython.int:
+    """Return the same to the right."""
+    return (row_gap >> 2) + (row_gap >> 1 & 1)

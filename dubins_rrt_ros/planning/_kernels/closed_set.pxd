@@ -1,5 +1,8 @@
+cimport cython
+
 cdef float UNSEEN
 
+@cython.final
 cdef class ClosedSet:
     cdef int used
     cdef int bits

@@ -1,3 +1,4 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.clearance cimport Clearance
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 
@@ -8,6 +9,7 @@ cdef class CollisionChecker:
     cdef bint motion_is_free(self, Pose pose, double radius, Curve curve) noexcept nogil
     cdef double arc_is_free(self, Pose pose, double radius, int turn, double length, double walked) noexcept nogil
 
+@cython.final
 cdef class PolygonChecker(CollisionChecker):
     cdef double[:, ::1] discs
     cdef double[:, ::1] corners

@@ -1,6 +1,8 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.clearance cimport Clearance
 from dubins_rrt_ros.planning._kernels.eikonal cimport Eikonal
 
+@cython.final
 cdef class CostToGoKernel:
     cdef readonly tuple shape
     cdef readonly double side

@@ -39,19 +39,6 @@ def measure_row_gaps(free: cython.uchar[:, ::1], row_gap: cython.int[:, ::1]):
                 row_gap[row, column] = 4 * min(left, right) + (left > right) + 2 * (right > left)
 
 
-def left_gap(row_gap):
-    """Return a bound of how many cells away the next blocked cell to the left is: exact where it is the nearer one.
-
-    The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
-    """
-    return (row_gap >> 2) + (row_gap & 1)
-
-
-def right_gap(row_gap):
-    """Return the same to the right."""
-    return (row_gap >> 2) + (row_gap >> 1 & 1)
-
-
 def fill_columns(row_gap: cython.int[:, ::1], first: cython.int, last: cython.int, of_squared: cython.float[::1],
                  out: cython.float[:, ::1]):
     """Write a function of the squared distance to the columns from `first` up to `last`, without that.

@@ -1,6 +1,9 @@
+cimport cython
+
 cdef double FAR
 cdef (double, double) squared_slopes(double here, double right, double above, double beyond) noexcept nogil
 
+@cython.final
 cdef class Eikonal:
     cdef int width, size
     cdef readonly signed char[::1] free

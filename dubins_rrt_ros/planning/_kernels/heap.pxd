@@ -1,3 +1,6 @@
+cimport cython
+
+@cython.final
 cdef class Heap:
     cdef int count
     cdef int[::1] items

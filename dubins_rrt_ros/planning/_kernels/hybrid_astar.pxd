@@ -1,9 +1,11 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.closed_set cimport ClosedSet
 from dubins_rrt_ros.planning._kernels.collision cimport CollisionChecker
 from dubins_rrt_ros.planning._kernels.cost_to_go cimport CostToGoKernel
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 from dubins_rrt_ros.planning._kernels.heap cimport Heap
 
+@cython.final
 cdef class HybridAStar:
     cdef CollisionChecker checker
     cdef double radius

@@ -34,5 +34,6 @@ cdef class BackwardNeighbors:
     cdef void collect_nearest(self, Pose pose, int wanted, double max_length) noexcept nogil
     cdef void collect_useful(self, Pose pose, int wanted, double max_cost, double max_length) noexcept nogil
 
+@cython.final
 cdef class ForwardNeighbors(BackwardNeighbors):
     cdef void collect_cheaper(self, int node, double radius, double least_gain) noexcept nogil

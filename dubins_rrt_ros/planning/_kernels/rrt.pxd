@@ -1,9 +1,11 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.collision cimport CollisionChecker
 from dubins_rrt_ros.planning._kernels.cost_to_go cimport CostToGoKernel
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 from dubins_rrt_ros.planning._kernels.near cimport BackwardNeighbors, ForwardNeighbors
 from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 
+@cython.final
 cdef class RrtKernel:
     cdef SearchTree tree
     cdef CollisionChecker checker

@@ -1,6 +1,8 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.collision cimport CollisionChecker
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 
+@cython.final
 cdef class Shortcutter:
     cdef CollisionChecker checker
     cdef double radius

@@ -1,5 +1,7 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 
+@cython.final
 cdef class SearchTree:
     cdef readonly int size
     cdef readonly int indexed

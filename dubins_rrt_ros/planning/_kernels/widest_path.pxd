@@ -1,6 +1,8 @@
+cimport cython
 from dubins_rrt_ros.planning._kernels.clearance cimport Clearance
 from dubins_rrt_ros.planning._kernels.heap cimport Heap
 
+@cython.final
 cdef class WidestPathSearch:
     cdef Clearance clearance
     cdef int rows
