@@ -31,7 +31,8 @@ def installed(folder, *patterns):
 
 ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 PLOTS = ["matplotlib>=3.6", "tqdm>=4.64"]
-TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "mypy>=1.8", "ruff>=0.6", *PLOTS]
+TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "mypy>=1.8", "types-PyYAML>=6.0",
+        "ruff>=0.6", *PLOTS]
 
 setup(
     name=PACKAGE,

@@ -10,6 +10,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
+from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
 from dubins_rrt_ros.planning.text import LONGEST
 
@@ -129,4 +130,5 @@ def test_a_document_with_a_wrong_curve_names_the_field(answer, curve, names):
 
 
 def test_a_curve_that_is_none_of_ours_is_read(answer):
-    assert read_path(changed(answer, curves=[FINE])).length == 2.0
+    curve = DubinsCurve(tuple(map(float, FINE["start"])), FINE["radius"], FINE["word"], tuple(map(float, FINE["lengths"])))
+    assert read_path(changed(answer, curves=[FINE], poses=[curve.start, curve.end])).length == 2.0
