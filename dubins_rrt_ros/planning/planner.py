@@ -13,6 +13,7 @@ import numpy as np
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
+from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .diagnosis import explain
 from .problem import Problem
@@ -128,8 +129,8 @@ class _Call:
 
     def _start_reaches_goal(self) -> bool:
         start, goal = self._problem.start, self._problem.goal
-        return (math.dist(start[:2], goal[:2]) <= self._problem.goal_tolerance_xy + SAME
-                and abs(math.remainder(start[2] - goal[2], math.tau)) <= self._problem.yaw_tolerance + SAME)
+        return (position_error(start, goal) <= self._problem.goal_tolerance_xy + SAME
+                and heading_error(start, goal) <= self._problem.yaw_tolerance + SAME)
 
     def _search(self, field: ClearanceField) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
@@ -216,8 +217,7 @@ class _Call:
         message = f"Path of {path.length:.2f} m{so_far}{above}, {drawn} in {elapsed:.3g} s"
         if self._problem.exact_goal:
             return message + "."
-        off = math.dist(path.end[:2], self._problem.goal[:2])
-        turned = abs(math.remainder(path.end[2] - self._problem.goal[2], math.tau))
+        off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)
         return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:

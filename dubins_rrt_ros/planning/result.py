@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from .audit.verdict import Audit
+from .curves.angles import heading_error, position_error
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
 from .problem import Problem
+from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
@@ -141,7 +143,7 @@ class Plan:
         problem = self.problem
         if path.start != problem.start:
             yield f"the path starts at {path.start}, not at {problem.start}"
-        off, turned = math.dist(path.end[:2], problem.goal[:2]), abs(math.remainder(path.end[2] - problem.goal[2], math.tau))
+        off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)
         if off > problem.goal_tolerance_xy + JOINT or turned > problem.yaw_tolerance + JOINT:
             yield f"the path ends {off:.3g} m and {turned:.3g} rad from the goal, whose tolerance is " \
                   f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"
@@ -166,7 +168,7 @@ class Plan:
 
     def _is_in_tree(self, path: Path) -> bool:
         """Return True if a node of the tree is reached by just this path."""
-        ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path.length)
+        ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path_cost(path))
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
 
 

@@ -18,7 +18,7 @@ from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.collision import CollisionChecker, PolygonChecker
 from .._kernels.cost_to_go import free_squares
-from ..curves.dubins import WORDS, DubinsCurve
+from ..curves.dubins import DubinsCurve
 from ..maps.frame import Frame
 from ..maps.model import GridMap, Map
 from ..problem import Pose
@@ -106,7 +106,7 @@ class ClearanceField:
         # What starts in free space stays there, as no edge is crossed.
         if not self.at(np.array(curve.start[:2])) > 0:
             return False
-        return self.collision_checker(vehicle).is_motion_free(curve.start, curve.radius, WORDS.index(curve.word), curve.lengths)
+        return self.collision_checker(vehicle).is_motion_free(curve.start, curve.radius, curve.index, curve.lengths)
 
     def cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and columns of the raster's cells that hold (..., 2) points of the map."""

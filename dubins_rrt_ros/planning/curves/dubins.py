@@ -19,6 +19,8 @@ WORDS: tuple[str, ...] = _kernel.WORDS
 
 #: Sides to which the letters of a word turn: left, straight on, right.
 SIDES = {"L": 1, "S": 0, "R": -1}
+#: (words, 3): True where an arc of a word turns.
+TURNS = np.array([[SIDES[letter] != 0 for letter in word] for word in WORDS])
 #: Relative rounding of a length.
 ROUNDING = 1e-9
 
@@ -45,9 +47,9 @@ class DubinsCurve:
 
     Attributes:
         start: (x [m], y [m], theta [rad]).
-        radius: the turning radius [m].
-        word: the turns of the arcs, one of WORDS.
-        lengths: the lengths of the arcs [m].
+        radius: turning radius [m].
+        word: turns of the arcs, one of WORDS.
+        lengths: lengths of the arcs [m].
     """
 
     start: Pose
@@ -55,9 +57,21 @@ class DubinsCurve:
     word: str
     lengths: tuple[float, float, float]
 
+    @classmethod
+    def of_row(cls, start: np.ndarray, radius: float, word: int, lengths: np.ndarray) -> "DubinsCurve":
+        """Return the curve that a row of arrays holds, as those of a path or a tree; `word` is an index into WORDS."""
+        x, y, theta = start.tolist()
+        first, second, third = lengths.tolist()
+        return cls((x, y, theta), radius, WORDS[word], (first, second, third))
+
+    @property
+    def index(self) -> int:
+        """The index of the word in WORDS."""
+        return WORDS.index(self.word)
+
     @property
     def length(self) -> float:
-        """Its length [m]."""
+        """The length [m]."""
         first, second, third = self.lengths
         return first + second + third
 
@@ -68,37 +82,37 @@ class DubinsCurve:
 
     @property
     def end(self) -> Pose:
-        """The pose at its end, as driven."""
+        """The pose at the end, as driven."""
         return self.pose_at(self.length)
 
     def pose_at(self, s: float) -> Pose:
-        """The pose at arc length `s` [m] in [0, length].
+        """Return the pose at arc length `s` [m] in [0, length].
 
         Raises:
             ValueError: `s` is outside the curve.
         """
         if not 0 <= s <= self.length:
             raise ValueError(f"s is {s} m; the curve is {self.length} m long, so give 0 to {self.length}")
-        return _kernel.pose_along(self.start, self.radius, WORDS.index(self.word), self.lengths, s)
+        return _kernel.pose_along(self.start, self.radius, self.index, self.lengths, s)
 
     def poses(self, spacing: float) -> np.ndarray:
-        """(n, 3) float64 poses at most `spacing` [m] apart, both ends and the joints between the arcs included.
+        """Return (n, 3) float64 poses at most `spacing` [m] apart, with both ends and the joints between the arcs.
 
         Raises:
             ValueError: `spacing` is not positive.
         """
         if not spacing > 0:
             raise ValueError(f"spacing is {spacing} m; it must be positive")
-        stations = [np.zeros(1)]
+        parts = [np.zeros(1)]
         begin = 0.0
         for length in self.lengths:
             if length > 0:
                 steps = math.ceil(length / spacing)
-                stations.append(begin + length * (np.arange(1, steps + 1) / steps))
+                parts.append(begin + length * (np.arange(1, steps + 1) / steps))
                 begin += length
-        stations = np.concatenate(stations)
-        out = np.empty((len(stations), 3))
-        _kernel.poses_along(self.start, self.radius, WORDS.index(self.word), self.lengths, stations, out)
+        arc_lengths = np.concatenate(parts)
+        out = np.empty((len(arc_lengths), 3))
+        _kernel.poses_along(self.start, self.radius, self.index, self.lengths, arc_lengths, out)
         return out
 
     def check(self) -> None:
@@ -118,7 +132,7 @@ class DubinsCurve:
         self._check_turns()
 
     def _check_turns(self) -> None:
-        turns = [length / self.radius for turn, length in zip(self.word, self.lengths, strict=True) if turn != "S"]
+        turns = [length / self.radius for turns, length in zip(TURNS[self.index], self.lengths, strict=True) if turns]
         if max(turns) > math.tau * (1 + ROUNDING):
             raise CurveError(f"an arc of {self.word} turns by {max(turns):.9g} rad, more than a full circle")
         # All three are there: it is no piece of a longer curve that was cut within the second.
@@ -127,26 +141,43 @@ class DubinsCurve:
 
 
 def shortest(start: Pose, goal: Pose, radius: float) -> DubinsCurve:
-    """The shortest Dubins curve from `start` to `goal`; equal poses have length 0.
+    """Return the shortest Dubins curve from `start` to `goal`; equal poses have length 0.
 
     Args:
         start, goal: (x [m], y [m], theta [rad]).
-        radius: the turning radius [m].
+        radius: turning radius [m].
     """
     word, *lengths = _kernel.shortest_curve(start, goal, radius)
     return DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
 
 
 def candidates(start: Pose, goal: Pose, radius: float) -> dict[str, DubinsCurve]:
-    """Of each word the curve from `start` to `goal`, where there is one."""
+    """Return the curve of each word from `start` to `goal`, where there is one."""
     return {WORDS[word]: DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
             for word, *lengths in _kernel.all_curves(*start, *goal, radius)}
 
 
 def lengths(starts: np.ndarray, goals: np.ndarray, radius: float) -> np.ndarray:
-    """The lengths [m] of the shortest curves between (..., 3) arrays of poses, which are broadcast against each other."""
+    """Return the lengths [m] of the shortest curves between (..., 3) arrays of poses, broadcast against each other."""
     shape = np.broadcast_shapes(np.shape(starts), np.shape(goals))
     both = (np.broadcast_to(np.asarray(poses, dtype=float), shape).reshape(-1, 3) for poses in (starts, goals))
     out = np.empty(shape[:-1])
     _kernel.shortest_lengths(*(np.require(poses, requirements="CW") for poses in both), radius, out.reshape(-1))
+    return out
+
+
+def poses_on(waypoints: np.ndarray, words: np.ndarray, lengths: np.ndarray, radius: float, starts: np.ndarray, ends: np.ndarray,
+             arc_lengths: np.ndarray) -> np.ndarray:
+    """Return (m, 3) poses along curves of a path or a tree, headings in [-pi, pi].
+
+    Args:
+        waypoints: (n, 3) poses.
+        words, lengths: (n,) words and (n, 3) lengths of arcs [m], of the curves that lead to the waypoints.
+        radius: turning radius [m].
+        starts, ends: (m,) waypoints between which the curves lead; the words and lengths are those of the ends.
+        arc_lengths: (m,) lengths along these curves [m].
+    """
+    out = np.empty((len(arc_lengths), 3))
+    starts, ends = (np.asarray(indices, np.int64) for indices in (starts, ends))
+    _kernel.path_poses(waypoints, words, lengths, radius, starts, ends, arc_lengths, out)
     return out

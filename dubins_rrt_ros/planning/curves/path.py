@@ -11,7 +11,7 @@ from .._kernels import dubins as _kernel
 from ..errors import PlanningError
 from ..problem import Pose
 from .angles import heading_error, position_error
-from .dubins import WORDS, CurveError, DubinsCurve
+from .dubins import CurveError, DubinsCurve, poses_on
 
 #: Maximum distance between the end of a curve and the start of the next [m, rad].
 JOINT = 1e-6
@@ -60,7 +60,7 @@ class Path:
         if other := next((curve for curve in curves if curve.radius != radius), None):
             raise PathError(f"one curve of the path has a turning radius of {radius} m, and another one of {other.radius} m")
         return cls(np.array([*(curve.start for curve in curves), end], dtype=float),
-                   np.array([0, *(WORDS.index(curve.word) for curve in curves)], np.int8),
+                   np.array([0, *(curve.index for curve in curves)], np.int8),
                    np.array([(0.0, 0.0, 0.0), *(curve.lengths for curve in curves)]), radius)
 
     @classmethod
@@ -80,19 +80,19 @@ class Path:
 
     @property
     def start(self) -> Pose:
-        """The pose at which it starts."""
+        """The first waypoint."""
         return _pose(self.waypoints[0])
 
     @property
     def end(self) -> Pose:
-        """The pose at which it ends."""
+        """The last waypoint."""
         return _pose(self.waypoints[-1])
 
     @cached_property
     def curves(self) -> tuple[DubinsCurve, ...]:
         """The curves from start to end; none where the two are the same."""
-        rows = zip(self.waypoints[:-1].tolist(), self.words[1:].tolist(), self.lengths[1:].tolist(), strict=True)
-        return tuple(DubinsCurve(tuple(start), self.radius, WORDS[word], tuple(arcs)) for start, word, arcs in rows)
+        rows = zip(self.waypoints[:-1], self.words[1:].tolist(), self.lengths[1:], strict=True)
+        return tuple(DubinsCurve.of_row(start, self.radius, word, lengths) for start, word, lengths in rows)
 
     @property
     def length(self) -> float:
@@ -103,7 +103,7 @@ class Path:
         return float(np.cumsum(lengths)[-1])  # which adds in the order of the tree's costs, as sum() does not
 
     def poses(self, spacing: float) -> np.ndarray:
-        """(n, 3) float64 poses at most `spacing` [m] apart; start, end and every joint between two arcs are among them."""
+        """Return (n, 3) float64 poses at most `spacing` [m] apart; with start, end and every joint between two arcs."""
         if not self.curves:
             return self.waypoints.copy()
         parts = [curve.poses(spacing) for curve in self.curves]
@@ -112,15 +112,13 @@ class Path:
         return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
 
     def at(self, shares: np.ndarray) -> np.ndarray:
-        """(n, 3) poses at (n,) shares of the length, each in [0, 1]; headings in [-pi, pi]."""
+        """Return (n, 3) poses at (n,) shares of the length, each in [0, 1]; headings in [-pi, pi]."""
         lengths = self.lengths[1:].sum(axis=1)
         ends = np.cumsum(lengths)
         arc_lengths = shares * self.lengths[1:].sum()
         curves = np.minimum(np.searchsorted(ends, arc_lengths), len(ends) - 1)
-        out = np.empty((len(arc_lengths), 3))
-        _kernel.path_poses(self.waypoints, self.words, self.lengths, self.radius, curves, curves + 1,
-                           arc_lengths - np.append(0.0, ends)[curves], out)
-        return out
+        return poses_on(self.waypoints, self.words, self.lengths, self.radius, curves, curves + 1,
+                        arc_lengths - np.append(0.0, ends)[curves])
 
     def cut(self, longest: float) -> "Path":
         """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited."""

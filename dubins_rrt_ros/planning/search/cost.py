@@ -1,8 +1,15 @@
-"""What a path costs: the sum of the costs of its edges, which `_kernels/edge_cost.py` states."""
+"""What edges and paths cost: what `_kernels/edge_cost.py` states, for arrays."""
+
+import numpy as np
 
 from ..curves.path import Path
 
 
+def edge_costs(lengths: np.ndarray) -> np.ndarray:
+    """Return the (n,) costs of edges with (n, 3) lengths of arcs [m]: the lengths of the edges."""
+    return np.asarray(lengths[:, 0] + lengths[:, 1] + lengths[:, 2])
+
+
 def path_cost(path: Path) -> float:
-    """Return the cost of a path [m]: its length, summed as the tree sums the costs of its edges."""
-    return path.length
+    """Return the cost of a path [m], added up in the order of the tree's costs."""
+    return float(np.cumsum([0.0, *edge_costs(path.lengths[1:])])[-1])

@@ -1,18 +1,18 @@
-"""The search tree as it is handed out: a structure of arrays, apart from the one that the planner grows."""
+"""The search tree as a result: arrays, apart from those of the search."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from .._kernels import dubins as _dubins
 from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
-from ..curves.dubins import WORDS, DubinsCurve
+from ..curves.angles import heading_error, position_error
+from ..curves.dubins import TURNS, DubinsCurve, poses_on
 from ..curves.path import Path
 from ..errors import PlanningError
 from ..problem import Pose
 from ..vehicle import Vehicle
+from .cost import edge_costs
 
 
 class TreeError(PlanningError, AssertionError):
@@ -24,12 +24,12 @@ class Tree:
     """Nodes and the edges from their parents. Node 0 is the start.
 
     Attributes:
-        radius: the turning radius of all edges [m].
+        radius: turning radius of all edges [m].
         poses: (n, 3) float64: x [m], y [m], theta [rad].
         parents: (n,) int32; the start's is -1.
-        costs: (n,) float64: the length of the path from the start [m].
+        costs: (n,) float64: costs of the paths from the start, which are their lengths [m].
         words: (n,) int8, indices into WORDS; an edge is driven from the parent's pose.
-        lengths: (n, 3) float64: of the three arcs of each edge [m].
+        lengths: (n, 3) float64: lengths of the three arcs of each edge [m].
     """
 
     radius: float
@@ -55,33 +55,29 @@ class Tree:
 
     def curve_to(self, node: int) -> DubinsCurve:
         """Return the edge from the parent of `node`."""
-        start = tuple(self.poses[self.parents[node]].tolist())
-        return DubinsCurve(start, self.radius, WORDS[self.words[node]], tuple(self.lengths[node].tolist()))
+        return DubinsCurve.of_row(self.poses[self.parents[node]], self.radius, self.words[node], self.lengths[node])
 
     def path_to(self, node: int) -> Path:
         """Return the path from the start to `node`."""
         return path_to(node, self)
 
     def segments(self, spacing: float, most: int | None = None) -> np.ndarray:
-        """(m, 2, 2) float64: ends (x, y) [m] of the straight pieces that draw all edges; turns in pieces of `spacing` [m].
+        """Return (m, 2, 2) float64 ends (x, y) [m] of straight pieces that draw all edges, turns in pieces of `spacing` [m].
 
-        No more than the first `most`, which lead to the oldest nodes.
+        At most the first `most` pieces, which lead to the oldest nodes.
         """
-        turning = np.array([[turn != "S" for turn in word] for word in WORDS])[self.words]
-        pieces = np.where(turning, np.ceil(self.lengths / spacing), self.lengths > 0).astype(np.int64).ravel()
+        pieces = np.where(TURNS[self.words], np.ceil(self.lengths / spacing), self.lengths > 0).astype(np.int64).ravel()
         arc = np.repeat(np.arange(len(pieces)), pieces)[:most]
         nth = np.arange(len(arc)) - (np.cumsum(pieces) - pieces)[arc]
         begins = (np.cumsum(self.lengths, axis=1) - self.lengths).ravel()
         piece = self.lengths.ravel()[arc] / pieces[arc]
-        out, poses, nodes = np.empty((len(arc), 2, 2)), np.empty((len(arc), 3)), arc // 3
-        for end in (0, 1):
-            _dubins.path_poses(self.poses, self.words, self.lengths, self.radius, self.parents[nodes].astype(nodes.dtype), nodes,
-                               begins[arc] + (nth + end) * piece, poses)
-            out[:, end] = poses[:, :2]
-        return out
+        nodes = arc // 3
+        ends = [poses_on(self.poses, self.words, self.lengths, self.radius, self.parents[nodes], nodes,
+                         begins[arc] + (nth + end) * piece)[:, :2] for end in (0, 1)]
+        return np.stack(ends, axis=1)
 
     def check(self, field: ClearanceField | None = None, vehicle: Vehicle | None = None) -> None:
-        """Check the invariants, and where a field and a vehicle are given that it touches no obstacle along any edge.
+        """Check the invariants; with a field and a vehicle also that this touches no obstacle along any edge.
 
         Raises:
             TreeError: one does not hold.
@@ -98,20 +94,17 @@ class Tree:
             raise TreeError(f"node {int(np.argmax(ancestor >= 0))} is below a cycle")
         if not (self.lengths >= 0).all():
             raise TreeError(f"node {int(np.argmin((self.lengths >= 0).all(axis=1)))} has an arc that is not at least 0 long")
-        edges = self.lengths[1:, 0] + self.lengths[1:, 1] + self.lengths[1:, 2]
-        wrong = np.flatnonzero(self.costs[1:] != self.costs[parents[1:]] + edges) + 1
+        wrong = np.flatnonzero(self.costs[1:] != self.costs[parents[1:]] + edge_costs(self.lengths[1:])) + 1
         if len(wrong):
-            raise TreeError(f"the cost of node {wrong[0]} is not its parent's and the length of its edge")
+            raise TreeError(f"the cost of node {wrong[0]} is not its parent's and that of its edge")
         for node in range(1, n):
             self._check_edge(node, field, vehicle)
 
     def _check_edge(self, node: int, field: ClearanceField | None, vehicle: Vehicle | None) -> None:
         curve = self.curve_to(node)
-        x, y, theta = self.poses[node]
-        end = curve.end
-        off, turned = math.hypot(end[0] - x, end[1] - y), abs(math.remainder(end[2] - theta, math.tau))
-        if not (off <= 1e-9 * (1 + curve.length) and turned <= 1e-9):
-            raise TreeError(f"the edge to node {node} ends at {end}, not at ({x}, {y}, {theta})")
+        end, pose = curve.end, tuple(self.poses[node].tolist())
+        if not (position_error(end, pose) <= 1e-9 * (1 + curve.length) and heading_error(end, pose) <= 1e-9):
+            raise TreeError(f"the edge to node {node} ends at {end}, not at {pose}")
         if field and vehicle and not field.curve_is_free(curve, vehicle):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
 
