@@ -335,7 +335,7 @@ def bounds(map, vehicle, arcs):
     index, begin = np.arange(len(arcs.length)), np.zeros(len(arcs.length))
     squares = (audit_obstacles.PathsideSquares(map, False, arcs.x + 1j * arcs.y, 20.0, 20.0) if isinstance(map, GridMap)
                else audit_obstacles.PolygonObstacles(map.free))
-    outline = audit_sweep.Outline(vehicle.footprint, squares)
+    outline = audit_sweep.PolygonSweep(vehicle.footprint, squares)
     ends = [outline.clearance(*arcs.at(index, s)) for s in (begin, arcs.length)]
     return outline.bound(arcs, index, begin, arcs.length, *ends)
 

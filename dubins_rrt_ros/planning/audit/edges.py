@@ -7,8 +7,8 @@ import numpy as np
 
 from ..maps.model import GridMap
 from ..problem import Pose, Problem
-from .obstacles import PathsideSquares, obstacles_of
-from .sweep import PRECISION, SHARE, Arcs, Disc, Outline, clearance_findings
+from .obstacles import PathsideSquares, PolygonObstacles, obstacles_of
+from .sweep import PRECISION, SHARE, Arcs, DiscSweep, PolygonSweep, clearance_findings
 from .verdict import TOLERANCE, apart, broken_curves, driven_arcs, turn_findings
 
 if TYPE_CHECKING:
@@ -49,16 +49,17 @@ def curve_gap(curve: "DubinsCurve", problem: Problem) -> tuple[float, float]:
 
 def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
     """The gaps between the vehicle and the obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
-    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.footprint
+    world_map, unknown, vehicle = problem.map, problem.allow_unknown, problem.vehicle
     x, y, theta = np.asarray(poses, dtype=float).T
-    if not outline:
-        return Disc(obstacles_of(map, unknown)).clearance(x, y, theta) - problem.vehicle.robot_radius
-    if isinstance(map, GridMap):
-        reach = problem.vehicle.robot_radius + 8 * map.resolution
-        obstacles = PathsideSquares(map, unknown, x + 1j * y, problem.vehicle.robot_radius, reach)
+    if not vehicle.footprint:
+        return DiscSweep(obstacles_of(world_map, unknown)).clearance(x, y, theta) - vehicle.robot_radius
+    obstacles: PathsideSquares | PolygonObstacles
+    if isinstance(world_map, GridMap):
+        reach = vehicle.robot_radius + 8 * world_map.resolution
+        obstacles = PathsideSquares(world_map, unknown, x + 1j * y, vehicle.robot_radius, reach)
     else:
-        obstacles = obstacles_of(map, unknown)
-    return Outline(outline, obstacles).clearance(x, y, theta)
+        obstacles = PolygonObstacles(world_map.free)
+    return PolygonSweep(vehicle.footprint, obstacles).clearance(x, y, theta)
 
 
 def clearances(points: np.ndarray, problem: Problem) -> np.ndarray:

@@ -69,7 +69,8 @@ class GridObstacles:
             out[undecided] = np.minimum(out[undecided], self._within(reach, place[undecided]))
             undecided = undecided[out[undecided] >= reach]
             reach *= 4
-        return out * self._resolution
+        distances: np.ndarray = out * self._resolution
+        return distances
 
     def _within(self, reach: int, place: np.ndarray) -> np.ndarray:
         """How far points in the grid are from blocked cells, in cells; infinity where none is nearer than `reach`."""
@@ -123,9 +124,9 @@ class _Window:
         row = np.minimum(np.maximum(row, 0), len(self._rows) - 1)
         begin = row * self._width
         following = np.searchsorted(self._cells, begin + x.astype(int))
-        beside = np.minimum(self._cells[following] - begin - x, x - (self._cells[following - 1] - begin) - 1)
+        sideways = np.minimum(self._cells[following] - begin - x, x - (self._cells[following - 1] - begin) - 1)
         above = np.maximum(self._rows[row] - y, y - self._rows[row] - 1)
-        return np.sqrt((np.maximum(beside, 0)**2 + np.maximum(above, 0)**2).min(axis=1))
+        return np.asarray(np.sqrt((np.maximum(sideways, 0)**2 + np.maximum(above, 0)**2).min(axis=1)))
 
 
 class PathsideSquares:
@@ -166,7 +167,8 @@ class PathsideSquares:
     def _place(self, points: np.ndarray) -> np.ndarray:
         """Points in the grid's own frame, in cells."""
         x, y, yaw = self._grid.origin
-        return (points - complex(x, y)) * np.exp(-1j * yaw) / self._grid.resolution
+        place: np.ndarray = (points - complex(x, y)) * np.exp(-1j * yaw) / self._grid.resolution
+        return place
 
     def _blocks_near(self, points: np.ndarray, distance: float) -> np.ndarray:
         """Which blocks of the grid hold everything within a distance of points, in cells."""
@@ -203,18 +205,18 @@ def _rectangles(cells: np.ndarray) -> np.ndarray:
 def _shapes(corners: np.ndarray, hull: bool) -> np.ndarray:
     """The polygons with these corners, (n, c) complex, or the convex hulls of them."""
     coordinates = np.stack([corners.real, corners.imag], axis=-1)
-    return shapely.convex_hull(shapely.linestrings(coordinates)) if hull else shapely.polygons(coordinates)
+    return np.asarray(shapely.convex_hull(shapely.linestrings(coordinates)) if hull else shapely.polygons(coordinates))
 
 
 def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray) -> np.ndarray:
     """How far shapes are from the nearest in a tree."""
     _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
-    return distance
+    return np.asarray(distance)
 
 
 Obstacles = GridObstacles | PolygonObstacles
 
 
-def obstacles_of(map: Map, allow_unknown: bool) -> Obstacles:
-    """The obstacles of a map; they keep what they have read of it, for the next path on it."""
-    return GridObstacles(map, allow_unknown) if isinstance(map, GridMap) else PolygonObstacles(map.free)
+def obstacles_of(world_map: Map, allow_unknown: bool) -> Obstacles:
+    """Return the obstacles of a map; they keep what they have read of it, for the next path on it."""
+    return GridObstacles(world_map, allow_unknown) if isinstance(world_map, GridMap) else PolygonObstacles(world_map.free)

@@ -69,7 +69,7 @@ class _Steps:
     @property
     def curvature(self) -> np.ndarray:
         """Of the arcs [1/m]; 0 on the spot."""
-        return np.divide(self.turn, self.length, out=np.zeros(len(self.turn)), where=self.length > STEP)
+        return np.asarray(np.divide(self.turn, self.length, out=np.zeros(len(self.turn)), where=self.length > STEP))
 
     def slack(self, reach: float) -> float:
         """How far a vehicle that reaches so far around its reference point may be from where the arcs have it [m]."""
@@ -78,7 +78,8 @@ class _Steps:
 
     def arcs(self, poses: np.ndarray) -> Arcs:
         """What is driven, and the last pose."""
-        return Arcs(*poses.T, np.append(self.curvature, 0.0), np.append(self.length, 0.0))
+        x, y, theta = poses.T
+        return Arcs(x, y, theta, np.append(self.curvature, 0.0), np.append(self.length, 0.0))
 
 
 def _end_findings(poses: np.ndarray, problem: Problem, tolerance_xy: float, tolerance_yaw: float) -> list[str]:

@@ -76,12 +76,13 @@ def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacl
         obstacles: those of the problem's map, where they are at hand.
     """
     vehicle = problem.vehicle
-    need = slack + (TOUCH if vehicle.footprint else max(vehicle.robot_radius, POINT))
-    least, (x, y), decided = _least_clearance(arcs, problem, need, obstacles)
+    required_clearance = slack + (TOUCH if vehicle.footprint else max(vehicle.robot_radius, POINT))
+    least, (x, y), decided = _least_clearance(arcs, problem, required_clearance, obstacles)
     findings = []
     if not decided:
-        findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {need:g} m that it cannot be decided")
-    if least < need - CONTACT:
+        findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {required_clearance:g} m "
+                        "that it cannot be decided")
+    if least < required_clearance - CONTACT:
         what = _too_near(least, vehicle, f"the {slack:.6f} m that the poses are off their arcs" if slack > CONTACT else "")
         findings.append(f"at ({x:.3f}, {y:.3f}) {what}")
     return findings, least
@@ -97,42 +98,44 @@ def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
 _Least = tuple[float, tuple[float, float], bool]
 
 
-def _least_clearance(arcs: Arcs, problem: Problem, need: float, obstacles: Obstacles | None) -> _Least:
-    """The least clearance, where it is, and whether no piece can hide contact."""
-    map, unknown, outline = problem.map, problem.allow_unknown, problem.vehicle.footprint
-    if not outline:
-        return _narrow_down(arcs, Disc(obstacles or obstacles_of(map, unknown)), need)
-    if not isinstance(map, GridMap):
-        return _narrow_down(arcs, Outline(outline, obstacles or obstacles_of(map, unknown)), need)
-    reach = FIRST_CELLS * map.resolution
+def _least_clearance(arcs: Arcs, problem: Problem, required_clearance: float, obstacles: Obstacles | None) -> _Least:
+    """Return the least clearance, where it is, and whether no piece can hide contact."""
+    world_map, unknown, footprint = problem.map, problem.allow_unknown, problem.vehicle.footprint
+    if not footprint:
+        return _bisect(arcs, DiscSweep(obstacles or obstacles_of(world_map, unknown)), required_clearance)
+    if not isinstance(world_map, GridMap):
+        polygons = obstacles if isinstance(obstacles, PolygonObstacles) else PolygonObstacles(world_map.free)
+        return _bisect(arcs, PolygonSweep(footprint, polygons), required_clearance)
+    reach = FIRST_CELLS * world_map.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)
     x, y, _ = arcs.at(index, begin)
     while True:
-        squares = PathsideSquares(map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach)
-        found = _narrow_down(arcs, Outline(outline, squares), need)
+        squares = PathsideSquares(world_map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach)
+        found = _bisect(arcs, PolygonSweep(footprint, squares), required_clearance)
         if found[0] < squares.reach:
             return found
         reach *= 4
 
 
-class Disc:
+class DiscSweep:
     """A vehicle that is a disc, as the point in its middle."""
 
     def __init__(self, obstacles: Obstacles):
         self._obstacles = obstacles
 
     def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """At poses."""
+        """Return the clearance at poses [m]."""
         return self._obstacles.distance(x, y)
 
     def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
               at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
         """What pieces have at least, given their clearances at both ends."""
-        return (at_begin + at_end - size) / 2
+        bounds: np.ndarray = (at_begin + at_end - size) / 2
+        return bounds
 
 
-class Outline:
+class PolygonSweep:
     """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor."""
 
     def __init__(self, corners: tuple[tuple[float, float], ...], obstacles: PolygonObstacles | PathsideSquares):
@@ -140,7 +143,7 @@ class Outline:
         self._obstacles = obstacles
 
     def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """At poses."""
+        """Return the clearance at poses [m]."""
         return self._obstacles.shape_distance((x + 1j * y)[:, None] + np.exp(1j * theta)[:, None] * self._corners)
 
     def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
@@ -154,12 +157,13 @@ class Outline:
             corners.append((x + 1j * y)[piece, None] + np.exp(1j * theta)[piece, None] * edges)
         swept = self._obstacles.shape_distance(np.concatenate(corners, axis=1), hull=True)
         # A circle's arc that turns by an angle a has the sagitta r (1 - cos(a / 2)), which is at most r a^2 / 8.
-        speed = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
+        speed: np.ndarray = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
         sagitta = speed * np.abs(curvature) * size**2 / 8
-        return np.minimum(at_begin, np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(index)))) - sagitta)
+        bounds: np.ndarray = np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(index)))) - sagitta
+        return np.asarray(np.minimum(at_begin, bounds))
 
     def _edges(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The edges, in the vehicle's frame, divided where they move along themselves while it drives with the curvatures.
+        """Return the edges, in the vehicle's frame, divided where they move along themselves while it drives with the curvatures.
 
         Returns:
             For each of them the index of the curvature, and both ends, (n, 2).
@@ -177,32 +181,46 @@ class Outline:
         return np.nonzero(kept)[0], parts[kept]
 
 
-def _narrow_down(arcs: Arcs, vehicle: Disc | Outline, need: float) -> _Least:
-    """The least clearance, where it is, and whether no piece can hide contact: they are halved until that is so."""
-    index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
+class _LeastFound:
+    """The least clearance of all points of the arcs at which it was measured, and where it is.
 
-    def clearance(index, s):
-        nonlocal least, where
-        x, y, theta = arcs.at(index, s)
-        found = vehicle.clearance(x, y, theta)
+    Attributes:
+        clearance: the least one [m]; infinity before the first.
+        place: its x and y [m].
+    """
+
+    def __init__(self, arcs: Arcs, vehicle: DiscSweep | PolygonSweep):
+        self._arcs, self._vehicle = arcs, vehicle
+        self.clearance, self.place = math.inf, (math.nan, math.nan)
+
+    def measure(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Return the clearances at arc lengths `s` of the arcs `index`, and remember the least."""
+        x, y, theta = self._arcs.at(index, s)
+        found = self._vehicle.clearance(x, y, theta)
         nearest = int(np.argmin(found))
-        if found[nearest] < least:
-            least, where = float(found[nearest]), (float(x[nearest]), float(y[nearest]))
+        if found[nearest] < self.clearance:
+            self.clearance, self.place = float(found[nearest]), (float(x[nearest]), float(y[nearest]))
         return found
 
-    least, where = math.inf, (math.nan, math.nan)
+
+def _bisect(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float) -> _Least:
+    """Halve the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
+    least = _LeastFound(arcs, vehicle)
+    index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
     # A piece ends where the next begins, but for the last of an arc.
     last = np.append(index[1:] != index[:-1], True)
-    at_begin, at_ends = np.split(clearance(np.append(index, index[last]), np.append(begin, arcs.length)), [len(index)])
+    found = least.measure(np.append(index, index[last]), np.append(begin, arcs.length))
+    at_begin, at_ends = np.split(found, [len(index)])
     at_end = np.roll(at_begin, -1)
     at_end[last] = at_ends
-    while 0 < len(index) <= MOST_PIECES and least >= need - CONTACT:
+    while 0 < len(index) <= MOST_PIECES and least.clearance >= required_clearance - CONTACT:
         bound = vehicle.bound(arcs, index, begin, size, at_begin, at_end)
-        open_ = (bound < need - 2 * CONTACT) | (bound < least - max(PRECISION, SHARE * least))
-        index, begin, size, at_begin, at_end = (a[open_] for a in (index, begin, size / 2, at_begin, at_end))
+        is_open = ((bound < required_clearance - 2 * CONTACT)
+                   | (bound < least.clearance - max(PRECISION, SHARE * least.clearance)))
+        index, begin, size, at_begin, at_end = (a[is_open] for a in (index, begin, size / 2, at_begin, at_end))
         if len(index):
-            at_middle = clearance(index, begin + size)
+            at_middle = least.measure(index, begin + size)
             begin = np.concatenate([begin, begin + size])
             at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
             index, size = np.tile(index, 2), np.tile(size, 2)
-    return least, where, len(index) <= MOST_PIECES
+    return least.clearance, least.place, len(index) <= MOST_PIECES

@@ -87,9 +87,11 @@ def driven_arcs(curves: Sequence["DubinsCurve"], start: Pose) -> tuple[np.ndarra
     curvature, length = np.array([curve.arcs for curve in curves]).transpose(2, 1, 0)
     poses = [starts]
     for bend, along in zip(curvature, length, strict=True):
-        arc = Arcs(*poses[-1].T, bend, along)
+        x, y, theta = poses[-1].T
+        arc = Arcs(x, y, theta, bend, along)
         poses.append(np.column_stack(arc.at(np.arange(len(starts)), along)))
-    return starts, poses[-1], Arcs(*np.concatenate(poses[:-1]).T, curvature.ravel(), length.ravel())
+    x, y, theta = np.concatenate(poses[:-1]).T
+    return starts, poses[-1], Arcs(x, y, theta, curvature.ravel(), length.ravel())
 
 
 def _start_findings(path: "Path", problem: Problem) -> list[str]:
@@ -125,7 +127,7 @@ def turn_findings(curves: Sequence["DubinsCurve"], problem: Problem) -> list[str
     return findings
 
 
-def apart(a, b) -> tuple[float, float]:
-    """Distance [m] and angle [rad] between two poses; infinite where a path is driven beyond what numbers hold."""
+def apart(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    """Return distance [m] and angle [rad] between two poses; infinite where a path is driven beyond what numbers hold."""
     turned = a[2] - b[2]
     return math.hypot(a[0] - b[0], a[1] - b[1]), abs(math.remainder(turned, math.tau)) if math.isfinite(turned) else math.inf

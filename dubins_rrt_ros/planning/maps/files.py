@@ -41,7 +41,8 @@ _SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
 MAX_MAP_CELLS = 100_000_000
 
 
-def load_map(path: str | os.PathLike, *, max_map_cells: int = MAX_MAP_CELLS, map_directory: str = "") -> GridMap | PolygonMap:
+def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS,
+             map_directory: str = "") -> GridMap | PolygonMap:
     """Load a map file; its ending says what it is.
 
     `.yaml`, `.yml`: map_server's format, by the rules of ROS 2 Jazzy. `.geojson`, `.json`: see
@@ -68,7 +69,7 @@ def load_map(path: str | os.PathLike, *, max_map_cells: int = MAX_MAP_CELLS, map
         raise _located(path, error) from None
 
 
-def save_map(grid: GridMap, yaml_path: str | os.PathLike) -> None:
+def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
     """Write a grid as a map_server pair: the YAML file, and a binary PGM of the same name beside it.
 
     The mode is trinary: cells up to 25 become free, from 65 on occupied, all others unknown.
@@ -83,7 +84,7 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike) -> None:
     grey = np.full(grid.data.shape, _UNKNOWN_GREY, np.uint8)
     grey[(grid.data >= 0) & (grid.data <= FREE_UP_TO)] = _FREE_GREY
     grey[grid.data >= OCCUPIED_FROM] = _OCCUPIED_GREY
-    height, width = grey.shape
+    height, width = grid.data.shape
     try:
         if path.suffix not in (".yaml", ".yml"):
             raise MapError(f"the ending {path.suffix!r} is not a map_server file's; name it .yaml")
@@ -100,7 +101,7 @@ def _located(path: Path, error: MapError) -> MapError:
     return type(error)(f"{path}: {error}")
 
 
-def expand_home(path: str | os.PathLike) -> Path:
+def expand_home(path: str | os.PathLike[str]) -> Path:
     """A path, its leading `~` replaced by the home directory."""
     try:
         return Path(os.path.expanduser(path))
@@ -251,7 +252,7 @@ def _cell_values(mode: str, negate: bool, occupied: float, free: float) -> np.nd
         return np.where(grey <= OCCUPIED, grey, UNKNOWN).astype(np.int8)
     shade = grey.astype(np.float32) / np.float32(255)
     occupancy = shade if negate else np.float32(1) - shade
-    between = UNKNOWN
+    between: np.ndarray | int = UNKNOWN
     if mode == "scale":
         scaled = (occupancy - np.float32(free)) / np.float32(occupied - free) * np.float32(100)
         between = np.floor(scaled.astype(float) + 0.5)
@@ -286,7 +287,7 @@ READERS = {
     ".wkt": _polygon_reader(parse_wkt),
 }
 #: The endings of map files, and those that stand for one of them.
-MAP_ENDINGS = tuple(READERS)
+MAP_ENDINGS: tuple[str, ...] = tuple(READERS)
 OTHER_ENDINGS = {".yml": ".yaml", ".json": ".geojson"}
 #: The endings of polygon maps.
 POLYGON_ENDINGS = tuple(ending for ending, reader in READERS.items() if not reader.is_grid)

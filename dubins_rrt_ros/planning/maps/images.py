@@ -4,7 +4,7 @@ import io
 import re
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import BinaryIO
 
 import numpy as np
@@ -88,7 +88,7 @@ def _read_pgm(file: BinaryIO, max_cells: int) -> np.ndarray:
     if samples.max() > maxval:
         raise MapError(f"has a pixel of {samples.max()}, above its PGM maxval of {maxval}; correct the maxval")
     grey = _to_8_bits((65535 * np.arange(maxval + 1) + maxval // 2) // maxval)
-    return grey[samples].reshape(height, width)
+    return np.asarray(grey[samples].reshape(height, width))
 
 
 def _read_binary(file: BinaryIO, count: int, maxval: int) -> np.ndarray:
@@ -195,7 +195,7 @@ def _read_bmp(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | 
     return _read_with_pillow(BmpImagePlugin.BmpImageFile, file, max_cells, 8)
 
 
-def _read_with_pillow(reader: type[Image.Image], file: BinaryIO, max_cells: int,
+def _read_with_pillow(reader: Callable[[BinaryIO], Image.Image], file: BinaryIO, max_cells: int,
                       depth: int) -> tuple[np.ndarray, np.ndarray | None]:
     # Not Image.open: its guard against huge images warns or raises by a limit that is global. Here it is `max_cells`.
     try:

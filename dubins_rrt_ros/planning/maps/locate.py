@@ -75,7 +75,7 @@ def _places(name: str) -> list[Path]:
     return [path, own / path.name, own / f"{path.name}{OMITTED_ENDING}"] if is_own else [path]
 
 
-def _path_of(url: re.Match) -> Path:
+def _path_of(url: re.Match[str]) -> Path:
     path = unquote(url["path"], errors="surrogateescape")
     try:
         match url["scheme"].lower():

@@ -55,7 +55,7 @@ class GridMap:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     name: str = "grid"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         data = np.array(self.data, order="C")
         if data.ndim != 2 or data.size == 0:
             raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
@@ -132,7 +132,7 @@ class PolygonMap:
     free: shapely.Geometry
     name: str = "polygons"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if shapely.get_type_id(self.free) not in (3, 6) or shapely.is_empty(self.free):
             raise MapError(f"{self.name}: the free space is a {self.free.geom_type} without area; "
                            "give a Polygon or MultiPolygon")

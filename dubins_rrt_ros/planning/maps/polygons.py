@@ -29,7 +29,8 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
     Raises:
         MapError: the text is no such collection, or a ring is not valid; names the feature and the ring.
     """
-    bounds, obstacles = [], []
+    bounds: list[tuple[str, shapely.Geometry]] = []
+    obstacles: list[tuple[str, shapely.Geometry]] = []
     for number, feature in enumerate(_features(_parse_json(text)), 1):
         label = _label(number, feature)
         geometry = _geometry(feature, label)
@@ -58,7 +59,7 @@ def _check_crossings(features: list[shapely.Geometry]) -> None:
     step = 1 + _PAIRS // len(edges)
     for begin in range(0, len(edges), step):
         some, others = tree.query(edges[begin:begin + step])
-        count += np.count_nonzero(owner[begin + some] < owner[others])
+        count += int(np.count_nonzero(owner[begin + some] < owner[others]))
         if count > most:
             raise MapError(f"features: more than {most} pairs of their {len(edges)} edges may cross; unite what overlaps")
 
@@ -105,7 +106,7 @@ def _parse_json(text: str) -> Any:
         raise MapError(f"is no valid JSON ({error}); correct the text") from None
 
 
-def _features(document: Any) -> list:
+def _features(document: Any) -> list[Any]:
     kind = document.get("type") if isinstance(document, dict) else None
     if kind == "Feature":
         return [document]
@@ -117,7 +118,7 @@ def _features(document: Any) -> list:
     return features
 
 
-def _properties(feature: Any) -> dict:
+def _properties(feature: Any) -> dict[str, Any]:
     properties = feature.get("properties") if isinstance(feature, dict) else None
     return properties if isinstance(properties, dict) else {}
 
@@ -135,7 +136,7 @@ def _geometry(feature: Any, label: str) -> shapely.Geometry:
         raise MapError(f"{label} is {quoted(feature)}; give an object with the type Feature")
     geometry = feature.get("geometry")
     kind = geometry.get("type") if isinstance(geometry, dict) else None
-    if kind not in _POLYGONS:
+    if not isinstance(geometry, dict) or kind not in _POLYGONS:
         raise MapError(f"{label}: geometry has the type {quoted(kind)}; give a Polygon or MultiPolygon")
     coordinates = geometry.get("coordinates")
     if not isinstance(coordinates, list) or not coordinates:
@@ -164,7 +165,7 @@ def _ring(ring: Any, label: str) -> shapely.LinearRing:
     return _valid(shapely.LinearRing(positions), label)
 
 
-def _positions(ring: list, label: str) -> Iterator[tuple[float, float]]:
+def _positions(ring: list[Any], label: str) -> Iterator[tuple[float, float]]:
     for number, position in enumerate(ring, 1):
         if not isinstance(position, list) or len(position) < 2 or not all(map(_is_coordinate, position[:2])):
             allowed = f"two numbers of metres from {-MAX_COORDINATE:g} to {MAX_COORDINATE:g}"

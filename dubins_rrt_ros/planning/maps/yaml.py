@@ -31,7 +31,7 @@ def load_plain(text: str, *, aliases: bool) -> Any:
 
 
 class _Loader(yaml.BaseLoader):
-    def compose_node(self, parent, index):
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            raise yaml.composer.ComposerError(None, None, "there is an alias", self.peek_event().start_mark)
+            raise yaml.composer.ComposerError(None, None, "there is an alias", self.peek_event().start_mark)  # type: ignore[no-untyped-call]  # PyYAML's stubs leave it untyped
         return super().compose_node(parent, index)
