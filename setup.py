@@ -1,5 +1,6 @@
 """Metadata for pip and colcon alike: a [project] table in pyproject.toml would break `colcon build --symlink-install`."""
 
+import os
 from glob import glob
 
 from setuptools import Extension, find_packages, setup
@@ -9,16 +10,22 @@ KERNELS = f"{PACKAGE}/planning/_kernels"
 
 
 def compiled_kernels():
-    """The keyword arguments that compile the kernels, where Cython is at hand; without it they run interpreted.
+    """Return the keyword arguments that compile the kernels, where Cython is at hand; without it they run interpreted.
 
+    With DUBINS_RRT_REQUIRE_COMPILED=1 in the environment a build without Cython or a compiler fails.
     Cython's build_ext translates when it builds: cythonize() here would print to standard output, which colcon reads.
     """
+    required = os.environ.get("DUBINS_RRT_REQUIRE_COMPILED", "0") not in ("", "0")
     try:
         from Cython.Distutils import build_ext
     except ImportError:
+        if required:
+            raise
         return {}
+    # -g0: debug symbols would make the modules six times as large.
     extensions = [
-        Extension(path[:-3].replace("/", "."), [path], optional=True, extra_compile_args=["-O3", "-ffp-contract=off"])
+        Extension(path[:-3].replace("/", "."), [path], optional=not required,
+                  extra_compile_args=["-O3", "-g0", "-ffp-contract=off"])
         for path in sorted(glob(f"{KERNELS}/[a-z]*.py"))
     ]
     return {"ext_modules": extensions, "cmdclass": {"build_ext": build_ext}}
