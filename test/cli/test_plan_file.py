@@ -131,4 +131,4 @@ def test_a_document_with_a_wrong_curve_names_the_field(answer, curve, names):
 
 def test_a_curve_that_is_none_of_ours_is_read(answer):
     curve = DubinsCurve(tuple(map(float, FINE["start"])), FINE["radius"], FINE["word"], tuple(map(float, FINE["lengths"])))
-    assert read_path(changed(answer, curves=[FINE], poses=[curve.start, curve.end])).length == 2.0
+    assert read_path(changed(answer, curves=[FINE], poses=[list(curve.start), list(curve.end)])).length == 2.0
