@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import ctypes
 import signal
 import sys
 
@@ -20,8 +19,6 @@ from .planner_node import PlannerNode
 
 #: Maximum time until a signal is noticed [s].
 SIGNAL_INTERVAL = 0.25
-#: Options of glibc's mallopt() by their numbers, M_MMAP_THRESHOLD [bytes] and M_ARENA_MAX, and what they are set to.
-MALLOC_OPTIONS = {-3: 128 * 1024, -8: 2}
 
 
 class ConfigurationError(Exception):
@@ -30,7 +27,6 @@ class ConfigurationError(Exception):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node and return the exit status: 1 where its configuration cannot be used."""
-    _give_memory_back()
     try:
         return _run(sys.argv if args is None else args)
     except (KeyboardInterrupt, ExternalShutdownException):
@@ -38,18 +34,6 @@ def main(args: list[str] | None = None) -> int:
     except ConfigurationError as error:
         print(f"planner: {error}", file=sys.stderr)
         return 1
-
-
-def _give_memory_back() -> None:
-    """Have the maps and trees that are let go given back to the system at once.
-
-    By itself glibc comes to keep freed blocks of up to 32 MB, in an arena for each thread, and what is left between them makes
-    the process grow: from 120 to 255 MB in nine minutes of many maps. Other C libraries are left as they are.
-    """
-    with contextlib.suppress(AttributeError, OSError):
-        mallopt = ctypes.CDLL(None).mallopt
-        for option, value in MALLOC_OPTIONS.items():
-            mallopt(option, value)
 
 
 def _run(arguments: list[str]) -> int:

@@ -42,7 +42,7 @@ def _keep_freed_memory() -> None:
 
     By itself it gives much of it back, and fetching that again, page by page, takes up to a quarter of the time to a first path.
     It keeps twice the largest block that it saw freed; this one costs nothing, as it is not touched. Other C libraries, and
-    limits that were set with mallopt(), as the node does, are left as they are.
+    limits that were set with mallopt(), are left as they are.
     """
     np.empty(LARGE_BLOCK, np.uint8)
 
