@@ -13,7 +13,7 @@ from .maps.model import Map
 from .option import is_number, options, values
 from .problem import Problem, checked_pose
 from .result import Plan
-from .settings import Settings
+from .settings import MAX_PLANNING_TIME, Settings
 from .text import one_line, quoted
 from .vehicle import Vehicle
 
@@ -74,9 +74,8 @@ def read_request(document: Mapping[str, Any], map: Map) -> tuple[Problem, Settin
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
     problem = Problem(map, vehicle, start, goal, **request)
     fields = _known(Settings, fields, "settings")
-    limit = next(item.high for item in options(Settings) if item.name == "planning_time")
     drawn = _field(document, "samples", int)
-    return problem, Settings(**fields | {"planning_time": limit, "samples": drawn or fields["samples"]})
+    return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"]})
 
 
 def read_path(document: Mapping[str, Any]) -> Path | None:

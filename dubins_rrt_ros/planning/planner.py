@@ -17,7 +17,7 @@ from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .diagnosis import explain
 from .problem import Problem
-from .result import Plan, Progress, Status, gap_above
+from .result import Plan, Progress, Status, gap_above, reaches_goal
 from .search.cost_to_go import CostToGo
 from .search.headings import FOLLOW_COST_TO_GO
 from .search.lower_bound import lower_bound
@@ -111,7 +111,7 @@ class _Call:
             return self._cancelled(self._root, 0)
         if diagnosis := explain.before_search(self._problem, field):
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
-        if self._start_reaches_goal():
+        if reaches_goal(self._problem.start, self._problem, rounding=SAME):
             self._time_to_first = self._elapsed
             return self._with_path(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
@@ -126,11 +126,6 @@ class _Call:
         self._obstacles = world.obstacles
         self._map_time, self._started = self._elapsed, time.perf_counter()
         return world
-
-    def _start_reaches_goal(self) -> bool:
-        start, goal = self._problem.start, self._problem.goal
-        return (position_error(start, goal) <= self._problem.goal_tolerance_xy + SAME
-                and heading_error(start, goal) <= self._problem.yaw_tolerance + SAME)
 
     def _search(self, field: ClearanceField) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
@@ -155,14 +150,16 @@ class _Call:
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
-        if path := search.path:
+        path = search.path
+        if path is not None:
             return self._with_path(path, search.tree, search.samples, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
         return self._plan(Status.TIMEOUT, message, search.tree, samples=search.samples)
 
     def _end_of(self, search: Search, field: ClearanceField, cancelled: bool) -> Plan:
         """Return the plan of a search that has ended."""
-        if path := search.path:
+        path = search.path
+        if path is not None:
             self._bound = lower_bound(self._problem, search.make_bound())
             return self._with_path(path, search.tree, search.samples, cancelled=cancelled and not search.done)
         return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)

@@ -84,12 +84,12 @@ class Problem:
 
     @property
     def yaw_tolerance(self) -> float:
-        """How far the last heading may be from the goal's [rad]: pi where any will do."""
+        """The maximum heading error at the goal [rad]: pi where any heading will do."""
         return math.pi if self.any_goal_heading else self.goal_tolerance_yaw
 
     @property
     def exact_goal(self) -> bool:
-        """Whether one pose alone is the goal."""
+        """True if one pose alone is the goal."""
         return self.goal_tolerance_xy == 0 and self.yaw_tolerance == 0
 
 
@@ -101,7 +101,7 @@ def _check_fit(world: PreparedMap, vehicle: Vehicle | None, allow_unknown: bool)
 
 
 def checked_pose(name: str, pose: Sequence[float]) -> Pose:
-    """`pose` as three floats.
+    """Return a pose as three floats.
 
     Raises:
         InvalidPose: it has not three finite numbers, or too large a yaw; `name` is in the message.

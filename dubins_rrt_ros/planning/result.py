@@ -10,7 +10,7 @@ from .curves.angles import heading_error, position_error
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
-from .problem import Problem
+from .problem import Pose, Problem
 from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
@@ -85,7 +85,7 @@ class Plan:
     @property
     def length(self) -> float | None:
         """The length of the path [m], or None."""
-        return self.path.length if self.path else None
+        return self.path.length if self.path is not None else None
 
     @property
     def min_clearance(self) -> float | None:
@@ -94,12 +94,12 @@ class Plan:
         From the path, on which the vehicle's reference point runs, where the vehicle is a disc; from all that it sweeps where it
         is a polygon.
         """
-        return self.audit.min_clearance if self.audit and self.path else None
+        return self.audit.min_clearance if self.audit is not None and self.path is not None else None
 
     @property
     def max_curvature(self) -> float | None:
         """The greatest curvature of the path [1/m], or None."""
-        return self.audit.max_curvature if self.audit and self.path else None
+        return self.audit.max_curvature if self.audit is not None and self.path is not None else None
 
     @property
     def gap(self) -> float | None:
@@ -143,8 +143,8 @@ class Plan:
         problem = self.problem
         if path.start != problem.start:
             yield f"the path starts at {path.start}, not at {problem.start}"
-        off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)
-        if off > problem.goal_tolerance_xy + JOINT or turned > problem.yaw_tolerance + JOINT:
+        if not reaches_goal(path.end, problem, rounding=JOINT):
+            off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)
             yield f"the path ends {off:.3g} m and {turned:.3g} rad from the goal, whose tolerance is " \
                   f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"
         audit, radius = self.audit, problem.vehicle.turning_radius
@@ -170,6 +170,12 @@ class Plan:
         """Return True if a node of the tree is reached by just this path."""
         ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path_cost(path))
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
+
+
+def reaches_goal(pose: Pose, problem: Problem, rounding: float) -> bool:
+    """Return True if a pose is within the goal's tolerances, enlarged by `rounding` [m, rad], of the goal."""
+    return (position_error(pose, problem.goal) <= problem.goal_tolerance_xy + rounding
+            and heading_error(pose, problem.goal) <= problem.yaw_tolerance + rounding)
 
 
 def gap_above(lower_bound: float, length: float) -> float:
