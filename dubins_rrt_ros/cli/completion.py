@@ -93,13 +93,13 @@ class _Place(NamedTuple):
     Attributes:
         names: the names of the flag that the words follow; or the number of the place, where they follow none.
         words: number of words; none after a switch.
-        offer: the words to offer, or @map, @file or @folder, or "" where nothing is known.
+        suggestions: the words to suggest, or @map, @file or @folder, or "" where nothing is known.
         help: the first clause of the help.
     """
 
     names: list[str]
     words: int
-    offer: str
+    suggestions: str
     help: str
 
 
@@ -108,8 +108,9 @@ def _places(parser: argparse.ArgumentParser) -> Iterator[_Place]:
     for action in parser._actions:
         number += not action.option_strings
         words = action.nargs if isinstance(action.nargs, int) else _MANY if action.nargs == "+" else 1
-        offer = " ".join(action.choices or [_KINDS.get(str(action.metavar), "")])
-        yield _Place(list(action.option_strings) or [str(number)], words, offer, re.split(r" \[| \(|[;:,]", action.help or "")[0])
+        suggestions = " ".join(action.choices or [_KINDS.get(str(action.metavar), "")])
+        clause = re.split(r" \[| \(|[;:,]", action.help or "")[0]
+        yield _Place(list(action.option_strings) or [str(number)], words, suggestions, clause)
 
 
 def _flags(parser: argparse.ArgumentParser) -> list[str]:
@@ -124,7 +125,7 @@ def _list_maps() -> str:
 
 def _bash(parsers: Mapping[str, Parser]) -> Iterator[str]:
     places = (f"        {' | '.join(repr(f'{command} {name}') for name in place.names)}) "
-              f"offer={shlex.quote(place.offer)} left={place.words} ;;"
+              f"offer={shlex.quote(place.suggestions)} left={place.words} ;;"
               for command, parser in parsers.items() for place in _places(parser) if place.words)
     flags = (f"        {command}) flags='{' '.join(_flags(parser))}' ;;" for command, parser in parsers.items())
     parts = {"PLACES": "\n".join(places), "FLAGS": "\n".join(flags), "MAPS": _list_maps(),
@@ -155,7 +156,7 @@ def _fish_offer(place: _Place) -> str:
     if not place.words:
         return ""
     files, words = {"": ("-f", ""), "@file": ("-F", ""), "@folder": ("-f", "(__fish_complete_directories)"),
-                    "@map": ("-F", f"({_list_maps()})")}.get(place.offer, ("-f", place.offer))
+                    "@map": ("-F", f"({_list_maps()})")}.get(place.suggestions, ("-f", place.suggestions))
     return f" {files} -a {_fish_quoted(words)}" if words else f" {files}"
 
 

@@ -15,7 +15,7 @@ TREE_COLOR = ColorRGBA(r=0.35, g=0.55, b=0.85, a=0.6)
 PATH_COLOR = ColorRGBA(r=0.90, g=0.30, b=0.10, a=1.0)
 START_COLOR = ColorRGBA(r=0.10, g=0.60, b=0.20, a=1.0)
 GOAL_COLOR = ColorRGBA(r=0.75, g=0.10, b=0.50, a=1.0)
-CULPRIT_COLOR = ColorRGBA(r=0.95, g=0.75, b=0.05, a=0.9)
+FAILURE_COLOR = ColorRGBA(r=0.95, g=0.75, b=0.05, a=0.9)
 #: Length of a chord in turning radii; it deviates from its arc by 1 % of the radius.
 CHORD = 0.3
 
@@ -37,7 +37,7 @@ def tree_markers(plan: Plan | None, frame: str, stamp: Time, max_lines: int) -> 
         markers.append(_arrow(header, "start", plan.problem.start, radius, START_COLOR))
         markers.append(_arrow(header, "goal", plan.problem.goal, radius, GOAL_COLOR))
         if plan.location is not None:
-            markers.append(_disc(header, "culprit", plan.location, 0.3 * radius, CULPRIT_COLOR))
+            markers.append(_disc(header, "culprit", plan.location, 0.3 * radius, FAILURE_COLOR))
         if plan.path is not None:
             poses = plan.path.poses(CHORD * radius)
             markers += _lines(header, "path", Marker.LINE_STRIP, poses[:, :2], 3 * width, PATH_COLOR)

@@ -139,7 +139,7 @@ def test_a_narrow_map_leaves_room_for_the_title(tmp_path):
     assert width >= plots.WIDTH * plots.DPI - 1 and height > width
 
 
-def test_the_culprit_is_marked_where_it_is(tmp_path, room):
-    picture = Picture(tmp_path / "culprit.png", drawing(room)._replace(culprit=(6.0, 5.0)))
-    assert picture.places(plots.CULPRIT).mean(axis=0) == pytest.approx([6, 5], abs=0.05)
-    assert len(Picture(tmp_path / "none.png", drawing(room)).places(plots.CULPRIT)) == 0
+def test_the_cause_of_a_failure_is_marked_where_it_is(tmp_path, room):
+    picture = Picture(tmp_path / "culprit.png", drawing(room)._replace(location=(6.0, 5.0)))
+    assert picture.places(plots.FAILURE).mean(axis=0) == pytest.approx([6, 5], abs=0.05)
+    assert len(Picture(tmp_path / "none.png", drawing(room)).places(plots.FAILURE)) == 0

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..common.parser import UsageError
-from ..common.plots import CULPRIT, DPI, GOAL, PATH, START
+from ..common.plots import DPI, FAILURE, GOAL, PATH, START
 from .records import Best, RunRecord, Runs
 from .report import quantile, ratio
 
 #: Colours of Okabe and Ito's palette, without the yellow, which is too pale; after the last colour the next line style follows.
-COLOURS = (PATH, GOAL, START, CULPRIT, "#cc79a7", "#56b4e9", "#000000")
+COLOURS = (PATH, GOAL, START, FAILURE, "#cc79a7", "#56b4e9", "#000000")
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 #: Number of panels side by side; width and height of one, and height of a row of the legend [inch].
 COLUMNS, WIDTH, HEIGHT, ROW = 3, 3.3, 2.4, 0.3

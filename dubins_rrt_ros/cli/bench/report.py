@@ -137,17 +137,18 @@ def _problem_table(planners: Mapping[str, list[RunRecord]], best: Best, marks: l
 
 def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
     *early, last = figures["cost_at"].values()
-    return [planner, _share(figures), _spread(figures["time_to_first"], milliseconds), metres(figures["first_cost"]["median"]),
-            *(metres(costs["median"]) for costs in early), _spread(last, metres),
+    return [planner, _share(figures), _with_quartiles(figures["time_to_first"], milliseconds),
+            metres(figures["first_cost"]["median"]),
+            *(metres(costs["median"]) for costs in early), _with_quartiles(last, metres),
             *map(milliseconds, figures["time_to_within"].values())]
 
 
-def spread(values: list[float], show: Callable[[float], str]) -> str:
+def with_quartiles(values: list[float], show: Callable[[float], str]) -> str:
     """Write the median with the quartiles in brackets."""
-    return _spread(quartiles(values), show)
+    return _with_quartiles(quartiles(values), show)
 
 
-def _spread(values: Mapping[str, float], show: Callable[[float], str]) -> str:
+def _with_quartiles(values: Mapping[str, float], show: Callable[[float], str]) -> str:
     low, middle, high = map(show, values.values())
     return middle if low == high == "-" else f"{middle} [{low}, {high}]"
 

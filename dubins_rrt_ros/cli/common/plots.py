@@ -21,7 +21,7 @@ from dubins_rrt_ros.planning.maps.model import OCCUPIED_FROM
 
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
-TREE, PATH, START, GOAL, CULPRIT = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
+TREE, PATH, START, GOAL, FAILURE = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
 DPI = 160
 #: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
@@ -42,7 +42,7 @@ class Drawing(NamedTuple):
         path: (n, 3) poses of the path, close together; none where there is no path.
         title: the most important figures, in one sentence.
         subtitle: the other figures.
-        culprit: (x, y) of what keeps a path from being there [m], or None.
+        location: (x, y) of what keeps a path from being there [m], or None.
     """
 
     map: Map
@@ -53,7 +53,7 @@ class Drawing(NamedTuple):
     path: np.ndarray
     title: str
     subtitle: str
-    culprit: tuple[float, float] | None = None
+    location: tuple[float, float] | None = None
 
 
 def draw_plan(file: str, plan: Plan) -> None:
@@ -106,8 +106,8 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     axes.add_collection(LineCollection(list(drawing.tree), colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
     _draw_path(axes, drawing)
     draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
-    if drawing.culprit is not None:
-        axes.plot(*drawing.culprit, "x", color=CULPRIT, markersize=12, markeredgewidth=3, zorder=6)
+    if drawing.location is not None:
+        axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
 
 
 def frame(axes: Axes, world_map: Map) -> None:

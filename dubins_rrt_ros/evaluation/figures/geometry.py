@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import ArrayLike
 
-from dubins_rrt_ros.cli.common.plots import CULPRIT, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
+from dubins_rrt_ros.cli.common.plots import FAILURE, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle
 from dubins_rrt_ros.planning.collision.footprint import cover
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
@@ -116,14 +116,14 @@ def collision_walk() -> Figure:
     frame(axes, ROOM)
     axes.set_title(f"{len(queries)} looks find {CURVE.length:.1f} m of curve free; {exact} need the exact distance",
                    fontsize=TITLE, weight="bold", loc="left")
-    for is_exact, colour in ((False, GOAL), (True, CULPRIT)):
+    for is_exact, colour in ((False, GOAL), (True, FAILURE)):
         _draw_queries(axes, [query for query in queries if query.is_exact == is_exact], colour)
     draw_on(axes, Drawing(ROOM, CURVE.start, CURVE.end, DISC, np.empty((0, 2, 2)), CURVE.poses(SPACING), "", ""))
     discs: dict[str, Any] = {"marker": "o", "markersize": 13, "linestyle": "none"}
     _add_legend(figure, [Line2D([], [], color=PATH, linewidth=2.2, label="curve"),
                          Patch(facecolor=PATH, alpha=0.3, label="vehicle"),
                          Line2D([], [], color=GOAL, markerfacecolor=TREE, **discs, label="bound from the raster"),
-                         Line2D([], [], color=CULPRIT, markerfacecolor=FREE, **discs, label="exact distance")])
+                         Line2D([], [], color=FAILURE, markerfacecolor=FREE, **discs, label="exact distance")])
     return figure
 
 

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from dubins_rrt_ros.cli.common.plots import (
-    CULPRIT,
+    FAILURE,
     FREE,
     GOAL,
     PATH,
@@ -126,9 +126,9 @@ def bounds() -> Figure:
     region = axes.contour(*known.over_grid(problem), levels=[final.length], colors="white", zorder=3)
     region.set(**EDGED)
     poses = path_of(final).poses(SPACING)
-    axes.plot(poses[:, 0], poses[:, 1], color=CULPRIT, zorder=4, **EDGED)
+    axes.plot(poses[:, 0], poses[:, 1], color=FAILURE, zorder=4, **EDGED)
     draw_poses(axes, problem.start, problem.goal, problem.vehicle)
-    figure.legend(handles=[Line2D([], [], color=CULPRIT, label="best path", **EDGED),
+    figure.legend(handles=[Line2D([], [], color=FAILURE, label="best path", **EDGED),
                            Line2D([], [], color="white", label="a shorter one leads within", **EDGED)],
                   loc="outside lower center", ncols=2, fontsize=NOTE, frameon=False)
     return figure

@@ -6,7 +6,7 @@ from itertools import pairwise, product
 from typing import Any
 
 from dubins_rrt_ros import __version__
-from dubins_rrt_ros.cli.bench.report import median, metres, milliseconds, quartiles, spread, table
+from dubins_rrt_ros.cli.bench.report import median, metres, milliseconds, quartiles, table, with_quartiles
 from dubins_rrt_ros.cli.common.plots import planner_title
 
 from .answer import FOUND, WHY, found, why
@@ -164,7 +164,7 @@ def _question_row(measured: Measured, environment: str, headings: str, step_size
 
 
 def _question_cells(runs: list[Outcome]) -> list[str]:
-    return [_solved(runs), spread([run.time_to_first for run in runs], milliseconds),
+    return [_solved(runs), with_quartiles([run.time_to_first for run in runs], milliseconds),
             metres(median(run.samples_to_first for run in runs), 0), _lengths(runs)]
 
 
@@ -173,7 +173,7 @@ def _solved(runs: list[Outcome]) -> str:
 
 
 def _lengths(runs: list[Outcome]) -> str:
-    return spread([run.length for run in runs], metres)
+    return with_quartiles([run.length for run in runs], metres)
 
 
 def _gain(rrt: float, star: float) -> str:

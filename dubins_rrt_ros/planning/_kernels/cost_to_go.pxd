@@ -20,4 +20,4 @@ cdef class CostToGoKernel:
     cdef (double, double) place(self, double x, double y) noexcept nogil
     cdef int square_at(self, double column, double row) noexcept nogil
     cdef double within(self, int square, double along, double across) noexcept nogil
-    cdef double fall(self, int node, int step, int beside) noexcept nogil
+    cdef double fall(self, int node, int step, int across) noexcept nogil

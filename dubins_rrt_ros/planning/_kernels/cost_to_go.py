@@ -218,13 +218,13 @@ class CostToGoKernel:
             return here + along * (right - here) + across * (above - here)
         return beyond + (1 - along) * (above - beyond) + (1 - across) * (right - beyond)
 
-    def fall(self, node, step, beside):
+    def fall(self, node, step, across):
         """By how much the cost falls along an edge from a node to the cheaper neighbour by a step; negative to that before."""
         ahead: cython.double = FAR
         behind: cython.double = FAR
-        if self.free[node] or self.free[node - beside]:
+        if self.free[node] or self.free[node - across]:
             ahead = self.cost[node + step]
-        if self.free[node - step] or self.free[node - step - beside]:
+        if self.free[node - step] or self.free[node - step - across]:
             behind = self.cost[node - step]
         if ahead < behind:
             return max(0.0, self.cost[node] - ahead)
