@@ -134,7 +134,7 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap
     data = np.frombuffer(message.data, dtype=np.int8).reshape(info.height, info.width)
     # The field is a float32; the decimal it stands for gives the same map as the file that was published.
     resolution = float(str(np.float32(info.resolution)))
-    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name)
+    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name, percent=True)
 
 
 def grid_message(grid: GridMap, frame: str, stamp: Time) -> OccupancyGrid:

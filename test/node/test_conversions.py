@@ -180,6 +180,12 @@ def test_a_map_is_the_same_by_file_and_by_topic(over_the_wire):
     assert grid_from(over_the_wire(grid_message(grid, "map", STAMP)), "map", 16).id == grid.id
 
 
+def test_the_cells_of_a_message_are_always_percent(over_the_wire):
+    message = occupancy()
+    message.data = array.array("b", [0, 1, -1, 1])
+    assert grid_from(over_the_wire(message), "map", 4).data.tolist() == [[0, 1], [-1, 1]]
+
+
 def occupancy(width=2, height=2, resolution=0.1, values=4, frame="map", q=(0.0, 0.0, 0.0, 1.0), x=0.0):
     message = OccupancyGrid(data=array.array("b", [0] * values))
     message.header.frame_id = frame

@@ -1,6 +1,7 @@
 """GridMap, PolygonMap and rasterise."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dubins_rrt_ros.planning import Problem, Settings, Vehicle, plan
 from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, GridMap, MapError, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
@@ -51,11 +53,43 @@ def test_bad_grid(changes, word):
         GridMap(**{"data": [[0]], "resolution": 1.0, "name": "yard", **changes})
 
 
+@pytest.mark.parametrize("data, cells", [
+    ([[True, False]], [[100, 0]]), (np.array([[False, True]]), [[0, 100]]), (np.zeros((1, 2), int), [[0, 0]]),
+    (np.zeros((1, 2)), [[0, 0]]), ([[0.0, 100.0, -1.0]], [[0, 100, -1]]), (np.array([[0, 255 - 155]], np.uint8), [[0, 100]]),
+    ([[0, 1, 2]], [[0, 1, 2]]), ([[0, -1]], [[0, -1]])])
+def test_cells_that_are_understood(data, cells):
+    assert GridMap(data, 1.0).data.tolist() == cells
+
+
+@pytest.mark.parametrize("data, remedy", [
+    ([[0, 1]], "give 100 for an obstacle, or data == 1"), ([[1, 1]], "give 100"), ([[0, 1, -1]], "give 100"),
+    (np.array([[0, 1]], np.int8), "give 100"), ([[0.0, 1.0]], "give 100"), ([[0.0, 0.7, 1.0]], "holds 0.7; give whole percent"),
+    ([[0.0, 99.5]], "holds 99.5"), ([[math.nan, 0.0]], "nan"), ([["a"]], "give integers"), ([[0, 300]], "from 0 to 300")])
+def test_cells_that_may_be_meant_otherwise_are_refused_with_the_remedy(data, remedy):
+    with pytest.raises(MapError, match=remedy):
+        GridMap(data, 1.0)
+
+
+def test_one_percent_is_taken_where_percent_is_said():
+    grid = GridMap([[0, 1, -1]], 1.0, percent=True)
+    assert grid.data.tolist() == [[0, 1, -1]]
+    for again in (pickle.loads(pickle.dumps(grid)), grid.window((0.5, 0.5), 3.0)):
+        assert again.data.tolist() == grid.data.tolist() and not again.data.flags.writeable
+
+
+@pytest.mark.parametrize("wall", [True, 100])
+def test_a_path_goes_around_a_wall_of_booleans_as_around_one_of_percent(wall):
+    cells = np.zeros((100, 200), type(wall))
+    cells[:60, 100] = wall
+    answer = plan(Problem(GridMap(cells, 0.1), Vehicle(), (2, 2, 0), (18, 2, 0)), Settings(seed=1))
+    assert 17.3 < answer.length < 18.5
+
+
 def test_id_of_a_grid_is_that_of_its_content():
-    grid = GridMap([[0, 1]], 0.5, (1, 2, 3), "a")
-    assert grid.id == GridMap(np.array([[0, 1]], np.int64), 0.5, (1.0, 2.0, 3.0), "b").id
-    others = [GridMap([[0, 2]], 0.5, (1, 2, 3)), GridMap([[0], [1]], 0.5, (1, 2, 3)),
-              GridMap([[0, 1]], 0.25, (1, 2, 3)), GridMap([[0, 1]], 0.5, (1, 2, 3.5))]
+    grid = GridMap([[0, 9]], 0.5, (1, 2, 3), "a")
+    assert grid.id == GridMap(np.array([[0, 9]], np.int64), 0.5, (1.0, 2.0, 3.0), "b").id
+    others = [GridMap([[0, 2]], 0.5, (1, 2, 3)), GridMap([[0], [9]], 0.5, (1, 2, 3)),
+              GridMap([[0, 9]], 0.25, (1, 2, 3)), GridMap([[0, 9]], 0.5, (1, 2, 3.5))]
     assert len({grid.id, *(other.id for other in others)}) == 5
 
 

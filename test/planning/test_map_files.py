@@ -93,6 +93,10 @@ def test_raw_takes_the_value_and_ignores_negate_and_thresholds(tmp_path):
     assert load_map(path).data.tolist() == [[0, 1, 65, 100, -1, -1, -1, -1, -1]]
 
 
+def test_one_in_a_raw_image_is_one_percent(tmp_path):
+    assert load_map(write_grid(tmp_path, [[0, 1, 255]], mode="raw")).data.tolist() == [[0, 1, -1]]
+
+
 @pytest.mark.parametrize("mode, expected", [
     ("trinary", [100, -1, -1]), ("scale", [100, -1, 0]), ("raw", [0, 50, -1])])
 def test_transparency_is_unknown_but_in_raw(tmp_path, mode, expected):

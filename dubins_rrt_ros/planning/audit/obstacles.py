@@ -8,7 +8,7 @@ import math
 import numpy as np
 import shapely
 
-from ..maps.model import GridMap, Map
+from ..maps.model import GridMap, Map, blocked_cells
 
 #: Obstacles in a grid are looked for within so many cells of a point at first.
 FIRST_REACH = 8
@@ -92,7 +92,7 @@ class GridObstacles:
         """The cells of a square tile and those within the margin around it."""
         left, low = max(0, int(corner.real) - margin), max(0, int(corner.imag) - margin)
         part = self._data[low:int(corner.imag) + side + margin, left:int(corner.real) + side + margin]
-        return _Window(GridMap(part, self._resolution).blocked(self._allow_unknown), left, low)
+        return _Window(blocked_cells(part, self._allow_unknown), left, low)
 
 
 class _Window:
@@ -145,7 +145,7 @@ class PathsideSquares:
         self.reach = math.inf if near.all() else reach
         rectangles = [np.empty((0, 4), int)]
         for row, first, end in (BLOCK * _runs(near)).tolist():
-            part = GridMap(grid.data[row:row + BLOCK, first:end], grid.resolution).blocked(allow_unknown)
+            part = blocked_cells(grid.data[row:row + BLOCK, first:end], allow_unknown)
             rectangles.append(_rectangles(part) + np.array([first, row, first, row]))
         self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
 

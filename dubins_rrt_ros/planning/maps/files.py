@@ -177,7 +177,7 @@ def _load_grid(path: Path, max_map_cells: int, directory: str) -> GridMap:
     data = _cell_values(mode, negate, occupied, free)[grey[::-1]]
     if transparent is not None and mode != "raw":
         data[transparent[::-1]] = UNKNOWN
-    return GridMap(data, resolution, origin, path.name)
+    return GridMap(data, resolution, origin, path.name, percent=True)
 
 
 def _parse_yaml(text: str) -> dict[str, Any]:

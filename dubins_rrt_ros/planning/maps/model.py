@@ -2,8 +2,8 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import InitVar, dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -44,24 +44,32 @@ class GridMap:
 
     Attributes:
         data: (height, width) int8, the values of nav_msgs/OccupancyGrid: -1 unknown, 0 free to 100 occupied. Row 0
-            is the lowest in the grid's own frame.
+            is the lowest in the grid's own frame. An array of Booleans is taken, too: True is an obstacle.
         resolution: the side of a cell [m].
         origin: (x [m], y [m], yaw [rad]) of the outer corner of cell (0, 0) in the map's frame.
         name: where it came from, for messages.
+        percent: take 1 as 1 % even if there is no cell above it. Without this such a grid is refused, since 1 is often meant to
+            be an obstacle.
+
+    Raises:
+        MapError: the cells are not of two dimensions, not whole numbers from -1 to 100, or likely meant as 0 and 1.
+        MapMetadataError: resolution or origin are not finite, or out of range.
     """
 
     data: np.ndarray
     resolution: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     name: str = "grid"
+    percent: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, percent: bool) -> None:
         data = np.array(self.data, order="C")
         if data.ndim != 2 or data.size == 0:
             raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
-        if data.dtype != np.int8 and not ((data >= UNKNOWN) & (data <= OCCUPIED)).all():
-            raise MapError(f"{self.name}: cells hold values from {data.min()} to {data.max()}; give -1 (unknown), or 0 to 100")
-        data = data.astype(np.int8, copy=False)
+        data = _percentages(data, self.name)
+        if not percent and data.max() == 1:
+            raise MapError(f"{self.name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
+                           "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
         if not (math.isfinite(self.resolution) and self.resolution > 0):
             raise MapMetadataError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
         if not all(map(math.isfinite, self.origin)):
@@ -75,10 +83,8 @@ class GridMap:
         object.__setattr__(self, "origin", tuple(map(float, self.origin)))
 
     def blocked(self, allow_unknown: bool) -> np.ndarray:
-        """(height, width) bool: the cells that are obstacles."""
-        if allow_unknown:
-            return self.data >= OCCUPIED_FROM
-        return (self.data > FREE_UP_TO) | (self.data < 0)
+        """Return (height, width) bool: the cells that are obstacles."""
+        return blocked_cells(self.data, allow_unknown)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -86,21 +92,21 @@ class GridMap:
         return self.data.shape[1] * self.resolution, self.data.shape[0] * self.resolution
 
     def to_grid_frame(self, points: np.ndarray) -> np.ndarray:
-        """(..., 2) points of the map's frame in the grid's own, where cell (0, 0) has its outer corner at (0, 0)."""
+        """Return (..., 2) points of the map's frame in the grid's own, where cell (0, 0) has its outer corner at (0, 0)."""
         return Frame(*self.origin).from_map(points)
 
     def to_map_frame(self, points: np.ndarray) -> np.ndarray:
-        """(..., 2) points of the grid's own frame in the map's."""
+        """Return (..., 2) points of the grid's own frame in the map's."""
         return Frame(*self.origin).to_map(points)
 
     def window(self, centre: tuple[float, float], reach: float) -> "GridMap":
-        """The part of the grid that holds everything within `reach` [m] of a point in it."""
+        """Return the part of the grid that holds everything within `reach` [m] of a point in it."""
         column, row = self.to_grid_frame(np.array(centre)) / self.resolution
         cells = math.ceil(reach / self.resolution) + 1
         left, low = max(0, int(column) - cells), max(0, int(row) - cells)
         corner = self.to_map_frame(np.array([left, low]) * self.resolution)
         return GridMap(self.data[low:int(row) + cells + 1, left:int(column) + cells + 1], self.resolution,
-                       (*corner, self.origin[2]), self.name)
+                       (*corner, self.origin[2]), self.name, percent=True)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]; read-only."""
@@ -117,7 +123,8 @@ class GridMap:
         return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin)).encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return GridMap, (self.data, self.resolution, self.origin, self.name)  # so that its cells are read-only again
+        # Made anew, so that its cells are read-only again.
+        return partial(GridMap, percent=True), (self.data, self.resolution, self.origin, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +169,35 @@ class PolygonMap:
 
 
 Map = GridMap | PolygonMap
+
+
+def blocked_cells(data: np.ndarray, allow_unknown: bool) -> np.ndarray:
+    """Return (height, width) bool: which cells of a grid's data are obstacles."""
+    if allow_unknown:
+        return np.asarray(data >= OCCUPIED_FROM)
+    return np.asarray((data > FREE_UP_TO) | (data < 0))
+
+
+def _percentages(data: np.ndarray, name: str) -> np.ndarray:
+    """Return cells as int8: Booleans as free and occupied, whole numbers from -1 to 100 as they are.
+
+    Raises:
+        MapError: they are something else.
+    """
+    if data.dtype == np.int8:
+        return data
+    if data.dtype == bool:
+        return np.where(data, OCCUPIED, FREE).astype(np.int8)
+    if data.dtype.kind not in "iuf":
+        raise MapError(f"{name}: cells are of type {data.dtype}; give integers, or Booleans, of which True is an obstacle")
+    if not ((data >= UNKNOWN) & (data <= OCCUPIED)).all():
+        raise MapError(f"{name}: cells hold values from {data.min()} to {data.max()}; give -1 (unknown), or 0 to 100")
+    cells = data.astype(np.int8)
+    fractions = data[cells != data]
+    if fractions.size:
+        raise MapError(f"{name}: a cell holds {fractions[0]:g}; give whole percent from 0 (free) to 100 (occupied), such as "
+                       "100 * data rounded where they are probabilities")
+    return cells
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
