@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, plan
-from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, GridMap, MapError, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.errors import MapError
+from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, GridMap, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
 
@@ -94,7 +95,7 @@ def test_id_of_a_grid_is_that_of_its_content():
 
 
 def test_id_of_polygons_is_that_of_their_content():
-    assert PolygonMap(shapely.box(0, 0, 1, 1), "a").id == PolygonMap(shapely.box(0, 0, 1, 1), "b").id
+    assert PolygonMap(shapely.box(0, 0, 1, 1), name="a").id == PolygonMap(shapely.box(0, 0, 1, 1), name="b").id
     assert PolygonMap(shapely.box(0, 0, 1, 1)).id != PolygonMap(shapely.box(0, 0, 1, 2)).id
 
 
@@ -107,7 +108,54 @@ def test_corners_of_polygons():
     shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])])
 def test_bad_polygons(free):
     with pytest.raises(MapError, match="^yard: .*free space"):
-        PolygonMap(free, "yard")
+        PolygonMap(free, name="yard")
+
+
+SQUARE, WALL = [(0, 0), (10, 0), (10, 6), (0, 6)], [(4, 0), (5, 0), (5, 4), (4, 4)]
+PIECES = [[(6, 1), (7, 1), (7, 2)], WALL]
+
+
+@pytest.mark.parametrize("bounds, obstacles", [
+    (SQUARE, PIECES), ([*SQUARE, SQUARE[0]], np.array([SQUARE[:3], SQUARE[:3]]) / 10 + 5),
+    (shapely.Polygon(SQUARE), [shapely.Polygon(WALL)]),
+    (SQUARE, shapely.MultiPolygon([shapely.Polygon(WALL), shapely.box(8, 1, 9, 2)])), (SQUARE, ())])
+def test_polygons_of_bounds_and_obstacles(bounds, obstacles):
+    of_each = obstacles.geoms if isinstance(obstacles, shapely.Geometry) else obstacles
+    expected = shapely.Polygon(SQUARE) - shapely.union_all([shapely.Polygon(obstacle) for obstacle in of_each])
+    yard = PolygonMap.of(bounds, obstacles, name="yard")
+    assert yard.free.equals(expected) and yard.name == "yard"
+    assert PolygonMap.of(bounds).free.area == 60
+
+
+def test_a_path_goes_around_the_obstacles_of_polygons():
+    problem = Problem(PolygonMap.of(SQUARE, [WALL]), Vehicle(turning_radius=0.5), (1, 1, 0), (9, 1, 0))
+    assert 9.5 < plan(problem, Settings(seed=1)).length < 11
+
+
+@pytest.mark.parametrize("bounds, obstacles, reason", [
+    (SQUARE, WALL, r"obstacle 1 is \(4, 0\); give a polygon"),
+    ((0, 0, 10, 6), [], "the bounds polygon is .*three or more corners"),
+    (SQUARE, 7, "the obstacles are 7; give a list"), (SQUARE, [WALL, WALL[:2]], "obstacle 2 is"),
+    (SQUARE, [SQUARE], "no free space"),
+    (SQUARE, [[(0, 0), (1, 1), (1, 0), (0, 1)]], "obstacle 1 is not valid"),
+    (SQUARE, [[(0, 0), (math.nan, 0), (1, 1)]], "obstacle 1 has"),
+    ([(0, 0), (1e10, 0), (0, 5)], [], "the bounds polygon has the coordinate 1e.10"),
+    (shapely.Point(0, 0), [], "the bounds polygon is a Point"),
+    ("yard", [], "the bounds polygon is 'yard'")])
+def test_bounds_and_obstacles_that_are_no_polygons_are_named(bounds, obstacles, reason):
+    with pytest.raises(MapError, match=reason):
+        PolygonMap.of(bounds, obstacles)
+
+
+def test_obstacles_are_not_taken_for_the_name():
+    with pytest.raises(TypeError, match="positional"):
+        PolygonMap(shapely.box(0, 0, 9, 9), [shapely.box(1, 1, 2, 2)])
+    with pytest.raises(MapError, match=r"the name of a map is \[.*PolygonMap.of"):
+        PolygonMap(shapely.box(0, 0, 9, 9), name=[shapely.box(1, 1, 2, 2)])
+    with pytest.raises(MapError, match=r"the free space is \[.*PolygonMap.of"):
+        PolygonMap(SQUARE)
+    again = pickle.loads(pickle.dumps(PolygonMap(shapely.box(0, 0, 9, 9), name="yard")))
+    assert (again.name, again.free.area) == ("yard", 81)
 
 
 def naive_rasterise(polygons, resolution):
@@ -131,7 +179,7 @@ sixteenths = st.integers(1, 63).map(lambda number: number / 16)
 @given(st.lists(st.tuples(sixteenths, sixteenths, sixteenths, sixteenths), max_size=4))
 def test_rasterise_agrees_with_the_naive_way(obstacles):
     boxes = [shapely.box(min(a, c), min(b, d), max(a, c), max(b, d)) for a, b, c, d in obstacles if a != c and b != d]
-    polygons = PolygonMap(shapely.box(0, 0, 4, 4) - shapely.union_all(boxes), "yard")
+    polygons = PolygonMap(shapely.box(0, 0, 4, 4) - shapely.union_all(boxes), name="yard")
     grid = rasterise(polygons, 0.25)
     assert grid.data.tolist() == naive_rasterise(polygons, 0.25).tolist()
     x0, y0, _, _ = polygons.free.bounds

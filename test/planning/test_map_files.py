@@ -9,8 +9,9 @@ import shapely
 from PIL import Image
 from support.images import pgm
 
+from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
 from dubins_rrt_ros.planning.maps.files import load_map, save_map
-from dubins_rrt_ros.planning.maps.model import GridMap, MapError, MapMetadataError, MapNotFound, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, rasterise
 from dubins_rrt_ros.planning.text import LONGEST
 
 MAPS = Path(__file__).parents[2] / "maps"

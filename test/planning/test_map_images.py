@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 from support.images import chunks_of, palette, pgm, png, png_of, row_of, saved
 
+from dubins_rrt_ros.planning.maps.errors import MapError
 from dubins_rrt_ros.planning.maps.images import read_image
-from dubins_rrt_ros.planning.maps.model import MapError
 
 ROW = np.array([[0, 100, 205, 254]])
 

@@ -5,7 +5,8 @@ import json
 import pytest
 import shapely
 
-from dubins_rrt_ros.planning.maps.model import MapError, PolygonMap
+from dubins_rrt_ros.planning.maps.errors import MapError
+from dubins_rrt_ros.planning.maps.model import PolygonMap
 from dubins_rrt_ros.planning.maps.polygons import parse_geojson, parse_wkt
 
 SQUARE = [[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from dubins_rrt_ros.planning import load_map
+from dubins_rrt_ros.planning.maps.errors import MapNotFound
 from dubins_rrt_ros.planning.maps.locate import find_map, maps_directory
-from dubins_rrt_ros.planning.maps.model import MapNotFound
 
 
 def refusal(name):

@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 
 from ..text import quoted
+from .errors import MapError, MapMetadataError, MapNotFound
 from .images import read_image
 from .model import (
     FREE,
@@ -18,9 +19,6 @@ from .model import (
     OCCUPIED_FROM,
     UNKNOWN,
     GridMap,
-    MapError,
-    MapMetadataError,
-    MapNotFound,
     PolygonMap,
 )
 from .polygons import parse_geojson, parse_wkt

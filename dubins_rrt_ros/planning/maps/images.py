@@ -10,7 +10,7 @@ from typing import BinaryIO
 import numpy as np
 from PIL import BmpImagePlugin, Image, PngImagePlugin
 
-from .model import MapError
+from .errors import MapError
 
 #: The longest plain (P2) PGM that is read, and how much each pixel may take of it, beyond the longest header [bytes].
 MAX_PLAIN_PGM_BYTES, PLAIN_PGM_BYTES_PER_PIXEL = 64 * 2**20, 16

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 from urllib.parse import unquote
 
+from .errors import MapNotFound
 from .files import MAP_ENDINGS, expand_home
-from .model import MapNotFound
 
 PACKAGE = "dubins_rrt_ros"
 #: The ending that the name of an installed map may leave out.

@@ -2,16 +2,18 @@
 
 import hashlib
 import math
-from dataclasses import InitVar, dataclass
+from collections.abc import Iterable
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ..errors import PlanningError
-from ..text import one_line
+from ..text import quoted
+from .errors import MapError, MapMetadataError
 from .frame import Frame
+from .free_space import Shape, free_space, polygon_of, polygons_of
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 #: Cell values up to the first are free, from the second on occupied, others unknown: map_server's default thresholds,
@@ -21,21 +23,6 @@ FREE_UP_TO, OCCUPIED_FROM = 25, 65
 
 #: The smallest cells and the largest coordinates [m] that leave rounding far below what the planner guarantees.
 FINEST, FARTHEST = 1e-4, 1e8
-
-
-class MapError(PlanningError, ValueError):
-    """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
-
-    def __init__(self, message: str):
-        super().__init__(one_line(message))
-
-
-class MapNotFound(MapError):
-    """A map file, or the image that it names, that is not there or cannot be opened as a file."""
-
-
-class MapMetadataError(MapError):
-    """What describes a grid, and not its cells, that cannot be used: its YAML, its resolution, its origin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +116,21 @@ class GridMap:
 
 @dataclass(frozen=True, eq=False)
 class PolygonMap:
-    """Free space as polygons.
+    """Free space as polygons: `PolygonMap(free)`, or `PolygonMap.of(bounds, obstacles)`.
 
     Attributes:
         free: the free space, a valid shapely Polygon or MultiPolygon in metres; holes and the outside are obstacles.
-        name: where it came from, for messages.
+        name: where it came from, for messages; by keyword alone.
     """
 
     free: shapely.Geometry
-    name: str = "polygons"
+    name: str = field(default="polygons", kw_only=True)
 
     def __post_init__(self) -> None:
+        _check_name(self.name)
+        if not isinstance(self.free, shapely.Geometry):
+            raise MapError(f"{self.name}: the free space is {quoted(self.free)}; give a shapely Polygon or MultiPolygon, or "
+                           "PolygonMap.of(bounds, obstacles)")
         if shapely.get_type_id(self.free) not in (3, 6) or shapely.is_empty(self.free):
             raise MapError(f"{self.name}: the free space is a {self.free.geom_type} without area; "
                            "give a Polygon or MultiPolygon")
@@ -149,6 +140,21 @@ class PolygonMap:
         if not np.isfinite(shapely.bounds(self.free)).all():
             raise MapError(f"{self.name}: a coordinate is not finite; give finite metres")
         prepare_for_threads(self.free)
+
+    @classmethod
+    def of(cls, bounds: Shape, obstacles: Iterable[Shape] = (), *, name: str = "polygons") -> "PolygonMap":
+        """Make the map of what is inside the bounds and in no obstacle.
+
+        Args:
+            bounds: a polygon: its corners [(x, y), ...] in order [m], or a shapely Polygon or MultiPolygon.
+            obstacles: a list of such polygons.
+            name: where it came from, for messages.
+
+        Raises:
+            MapError: one of them is no valid polygon, or the obstacles leave no free space.
+        """
+        free = free_space(polygon_of(bounds, "the bounds polygon"), polygons_of(obstacles, "obstacle"), "polygons")
+        return cls(free, name=name)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the bounding rectangle, counter-clockwise [m]; read-only."""
@@ -165,10 +171,15 @@ class PolygonMap:
         return _digest(shapely.to_wkb(self.free, byte_order=1))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return PolygonMap, (self.free, self.name)  # so that they are prepared for threads again
+        return partial(PolygonMap, name=self.name), (self.free,)  # so that they are prepared for threads again
 
 
 Map = GridMap | PolygonMap
+
+
+def _check_name(name: Any) -> None:
+    if not isinstance(name, str):
+        raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
 
 
 def blocked_cells(data: np.ndarray, allow_unknown: bool) -> np.ndarray:

@@ -9,19 +9,15 @@ import numpy as np
 import shapely
 
 from ..text import quoted
-from .model import MapError, PolygonMap
+from .errors import MapError
+from .free_space import MAX_COORDINATE, free_space, valid
+from .model import PolygonMap
 
-#: The largest coordinate of a map [m]; beyond it a double cannot tell tenths of a micrometre.
-MAX_COORDINATE = 1e9
-#: How many pairs of edges of different features may cross, beyond one for each edge: a crossing takes 10 us and a kilobyte.
-MAX_CROSSINGS = 100_000
-#: How many pairs are looked at at once.
-_PAIRS = 5_000_000
 _POLYGONS = ("Polygon", "MultiPolygon")
 
 
 def parse_geojson(text: str, name: str) -> PolygonMap:
-    """The free space of a GeoJSON FeatureCollection in metres: the bounds less the union of the obstacles.
+    """Read the free space of a GeoJSON FeatureCollection in metres: the bounds less the union of the obstacles.
 
     The one feature with the property `"role": "bounds"` is the bounds, every other an obstacle; a hole of an obstacle
     is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored.
@@ -39,33 +35,11 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
     if len(bounds) != 1:
         found = ", ".join(label for label, _ in bounds[:5]) or "none"
         raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
-    _check_crossings([geometry for _, geometry in bounds + obstacles])
-    try:
-        free = bounds[0][1] - shapely.union_all([geometry for _, geometry in obstacles])
-    except shapely.GEOSException as error:
-        raise MapError(f"features: the obstacles cannot be taken from the bounds ({error}); simplify them") from None
-    return _polygon_map(free, name, "features: the obstacles leave no free space; move or remove some")
-
-
-def _check_crossings(features: list[shapely.Geometry]) -> None:
-    """Refuse features that may cross each other so often that their union would take minutes and gigabytes."""
-    polygons, feature = shapely.get_parts(features, return_index=True)
-    rings, polygon = shapely.get_rings(polygons, return_index=True)
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    along = ring[:-1] == ring[1:]
-    edges = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)[along])
-    owner = feature[polygon[ring[:-1][along]]]
-    tree, most, count = shapely.STRtree(edges), MAX_CROSSINGS + len(edges), 0
-    step = 1 + _PAIRS // len(edges)
-    for begin in range(0, len(edges), step):
-        some, others = tree.query(edges[begin:begin + step])
-        count += int(np.count_nonzero(owner[begin + some] < owner[others]))
-        if count > most:
-            raise MapError(f"features: more than {most} pairs of their {len(edges)} edges may cross; unite what overlaps")
+    return PolygonMap(free_space(bounds[0][1], [geometry for _, geometry in obstacles], "features"), name=name)
 
 
 def parse_wkt(text: str, name: str) -> PolygonMap:
-    """The free space of a WKT file: one Polygon or MultiPolygon in metres; heights are dropped.
+    """Read the free space of a WKT file: one Polygon or MultiPolygon in metres; heights are dropped.
 
     Raises:
         MapError: the text is no such geometry, or the geometry is not valid.
@@ -88,13 +62,9 @@ def parse_wkt(text: str, name: str) -> PolygonMap:
     if bad.size:
         allowed = f"metres from {-MAX_COORDINATE:g} to {MAX_COORDINATE:g}"
         raise MapError(f"geometry has the coordinate {bad[0]}; give {allowed}")
-    return _polygon_map(_valid(free, "geometry"), name, "geometry is empty; give a polygon with an area")
-
-
-def _polygon_map(free: shapely.Geometry, name: str, when_empty: str) -> PolygonMap:
-    if shapely.is_empty(free):
-        raise MapError(when_empty)
-    return PolygonMap(free, name)
+    if shapely.is_empty(valid(free, "geometry")):
+        raise MapError("geometry is empty; give a polygon with an area")
+    return PolygonMap(free, name=name)
 
 
 def _parse_json(text: str) -> Any:
@@ -144,14 +114,14 @@ def _geometry(feature: Any, label: str) -> shapely.Geometry:
     if kind == "Polygon":
         return _polygon(coordinates, label)
     polygons = [_polygon(rings, f"{label}, polygon {i}") for i, rings in enumerate(coordinates, 1)]
-    return _valid(shapely.MultiPolygon(polygons), label)
+    return valid(shapely.MultiPolygon(polygons), label)
 
 
 def _polygon(rings: Any, label: str) -> shapely.Polygon:
     if not isinstance(rings, list) or not rings:
         raise MapError(f"{label}: coordinates is {quoted(rings)}; give a list of rings")
     shell, *holes = (_ring(ring, f"{label}, ring {i}") for i, ring in enumerate(rings, 1))
-    return _valid(shapely.Polygon(shell, holes), label)
+    return valid(shapely.Polygon(shell, holes), label)
 
 
 def _ring(ring: Any, label: str) -> shapely.LinearRing:
@@ -162,7 +132,7 @@ def _ring(ring: Any, label: str) -> shapely.LinearRing:
     if positions[0] != positions[-1]:
         ends = f"{positions[0]} to {positions[-1]}"
         raise MapError(f"{label} is not closed ({ends}); repeat its first position as the last")
-    return _valid(shapely.LinearRing(positions), label)
+    return valid(shapely.LinearRing(positions), label)
 
 
 def _positions(ring: list[Any], label: str) -> Iterator[tuple[float, float]]:
@@ -175,9 +145,3 @@ def _positions(ring: list[Any], label: str) -> Iterator[tuple[float, float]]:
 
 def _is_coordinate(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) <= MAX_COORDINATE
-
-
-def _valid(geometry: shapely.Geometry, label: str) -> shapely.Geometry:
-    if not shapely.is_valid(geometry):
-        raise MapError(f"{label} is not valid ({shapely.is_valid_reason(geometry)}); mend its rings")
-    return geometry

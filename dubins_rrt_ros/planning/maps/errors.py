@@ -1,0 +1,19 @@
+"""Errors of maps and of their files."""
+
+from ..errors import PlanningError
+from ..text import one_line
+
+
+class MapError(PlanningError, ValueError):
+    """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
+
+    def __init__(self, message: str):
+        super().__init__(one_line(message))
+
+
+class MapNotFound(MapError):
+    """A map file, or the image that it names, that is not there or cannot be opened as a file."""
+
+
+class MapMetadataError(MapError):
+    """What describes a grid, and not its cells, that cannot be used: its YAML, its resolution, its origin."""

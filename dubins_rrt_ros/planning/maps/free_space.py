@@ -1,0 +1,114 @@
+"""The free space between bounds and obstacles, each of them checked."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import shapely
+
+from ..text import quoted
+from .errors import MapError
+
+#: Largest coordinate of a map [m]; beyond it a double cannot tell tenths of a micrometre.
+MAX_COORDINATE = 1e9
+#: Maximum number of pairs of edges of different polygons that may cross, beyond one for each edge: a crossing takes 10 us and a
+#: kilobyte.
+MAX_CROSSINGS = 100_000
+#: Number of pairs of edges that are looked at together.
+_PAIRS = 5_000_000
+#: Numbers by which shapely knows Polygon and MultiPolygon.
+_POLYGONS = (3, 6)
+
+#: A polygon as a user gives it: a shapely Polygon or MultiPolygon, or its corners (x, y) [m] in order.
+Shape: TypeAlias = shapely.Geometry | Sequence[Sequence[float]] | np.ndarray
+
+
+def free_space(bounds: shapely.Geometry, obstacles: Sequence[shapely.Geometry], what: str) -> shapely.Geometry:
+    """Return the bounds less the union of the obstacles; all of them are valid polygons.
+
+    Raises:
+        MapError: their edges cross too often, or nothing is left; `what` says in the message what they are.
+    """
+    _check_crossings([bounds, *obstacles], what)
+    try:
+        free = bounds - shapely.union_all(obstacles)
+    except shapely.GEOSException as error:
+        raise MapError(f"{what}: the obstacles cannot be taken from the bounds ({error}); simplify them") from None
+    if shapely.is_empty(free):
+        raise MapError(f"{what}: the obstacles leave no free space; move or remove some")
+    return free
+
+
+def polygon_of(shape: Shape, label: str) -> shapely.Geometry:
+    """Return a shape as a polygon.
+
+    Raises:
+        MapError: it is no valid polygon in metres; `label` names it.
+    """
+    polygon = shape if isinstance(shape, shapely.Geometry) else shapely.Polygon(_corners(shape, label))
+    if shapely.get_type_id(polygon) not in _POLYGONS or shapely.is_empty(polygon):
+        raise MapError(f"{label} is a {polygon.geom_type} without area; give a polygon or its corners")
+    _checked_coordinates(shapely.get_coordinates(polygon), label)
+    return valid(polygon, label)
+
+
+def polygons_of(shapes: shapely.Geometry | Iterable[Shape], label: str) -> list[shapely.Geometry]:
+    """Return shapes as polygons.
+
+    Raises:
+        MapError: one of them is no valid polygon in metres; `label` and its number, from 1 on, name it.
+    """
+    if isinstance(shapes, shapely.Geometry):
+        shapes = shapely.get_parts(shapes).tolist()
+    try:
+        given = list(shapes)
+    except TypeError:
+        raise MapError(f"the {label}s are {quoted(shapes)}; give a list of polygons") from None
+    return [polygon_of(shape, f"{label} {number}") for number, shape in enumerate(given, 1)]
+
+
+def valid(geometry: shapely.Geometry, label: str) -> shapely.Geometry:
+    """Return a geometry that is valid.
+
+    Raises:
+        MapError: it is not.
+    """
+    if not shapely.is_valid(geometry):
+        raise MapError(f"{label} is not valid ({shapely.is_valid_reason(geometry)}); mend its rings")
+    return geometry
+
+
+def _corners(shape: Any, label: str) -> np.ndarray:
+    """Return (n, 2) corners [m]."""
+    try:
+        corners = np.array(shape, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        corners = np.empty(0)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
+        raise MapError(f"{label} is {quoted(shape)}; give a polygon: three or more corners [x, y] in metres")
+    return _checked_coordinates(corners, label)
+
+
+def _checked_coordinates(corners: np.ndarray, label: str) -> np.ndarray:
+    wrong = ~(np.abs(corners) <= MAX_COORDINATE)
+    if wrong.any():
+        raise MapError(f"{label} has the coordinate {corners[wrong][0]:g}; give metres from {-MAX_COORDINATE:g} to "
+                       f"{MAX_COORDINATE:g}")
+    return corners
+
+
+def _check_crossings(shapes: Sequence[shapely.Geometry], what: str) -> None:
+    """Refuse polygons that may cross each other so often that their union would take minutes and gigabytes."""
+    polygons, shape = shapely.get_parts(shapes, return_index=True)
+    rings, polygon = shapely.get_rings(polygons, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    along = ring[:-1] == ring[1:]
+    edges = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)[along])
+    owner = shape[polygon[ring[:-1][along]]]
+    tree, most, count = shapely.STRtree(edges), MAX_CROSSINGS + len(edges), 0
+    step = 1 + _PAIRS // len(edges)
+    for begin in range(0, len(edges), step):
+        some, others = tree.query(edges[begin:begin + step])
+        count += int(np.count_nonzero(owner[begin + some] < owner[others]))
+        if count > most:
+            raise MapError(f"{what}: more than {most} pairs of their {len(edges)} edges may cross; unite what overlaps")
