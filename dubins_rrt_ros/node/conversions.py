@@ -16,10 +16,14 @@ from std_msgs.msg import Header
 from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, rasterise
 from dubins_rrt_ros.planning.problem import Pose
 
-#: Maximum deviation of a quaternion's norm from 1: three decimals of each component are enough.
-NORM_TOLERANCE = 1e-3
-#: Maximum angle between a pose's z axis and the vertical [rad].
-TILT_TOLERANCE = 0.01
+#: Minimum norm of a quaternion that is taken, and the deviation from 1 beyond which it is doubtful.
+LEAST_NORM, DOUBTFUL_NORM = 1e-3, 0.1
+#: Minimum angle between a pose's x axis and the vertical [rad]: nearer it has no heading in the plane.
+LEAST_ANGLE_TO_VERTICAL = math.radians(1)
+#: Angle between a pose's z axis and the vertical beyond which it is doubtful [rad].
+DOUBTFUL_TILT = math.radians(10)
+#: Maximum angle between the z axis of a map and the vertical [rad]: further, distances would be wrong.
+MAP_TILT = 0.01
 #: Minimum size of the cells of a polygon map that is published as a grid, for display [m].
 RASTER_RESOLUTION = 0.05
 #: Maximum number of those cells: they take a second with simple polygons, and five with thousands of round ones.
@@ -34,16 +38,29 @@ def bare_pose(message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) ->
 
 
 def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> Pose:
-    """Return the (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height is ignored.
+    """Return the (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height and its tilt are ignored.
 
     Raises:
-        InvalidPose: it is not finite, not a rotation, or tilted; `name` is in the message.
+        InvalidPose: it is not finite, not a rotation, or its x axis is vertical; `name` is in the message.
     """
     pose = bare_pose(message)
     p = pose.position
     if not all(map(math.isfinite, (p.x, p.y, p.z))):
         raise InvalidPose(f"The {name} pose is at x {p.x}, y {p.y}, z {p.z}; give finite metres.")
     return p.x, p.y, _yaw(f"The {name} pose", pose.orientation, InvalidPose)
+
+
+def doubts_about(name: str, message: PoseMessage) -> dict[str, str]:
+    """Return what is unusual about the rotation of a pose that is taken nevertheless: sentences by the kind of doubt."""
+    q = message.orientation
+    norm, tilt = _norm(q), _tilt(q)
+    doubts = {}
+    if abs(norm - 1) > DOUBTFUL_NORM:
+        doubts["norm"] = f"The {name} pose has a quaternion of norm {norm:.3g}, which is normalised; see what publishes it."
+    if tilt > DOUBTFUL_TILT:
+        doubts["tilt"] = (f"The {name} pose leans by {math.degrees(tilt):.3g} degrees; the direction of its x axis in the plane "
+                          "is taken as its yaw.")
+    return doubts
 
 
 def pose_message(pose: Pose) -> PoseMessage:
@@ -130,7 +147,11 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap
     if len(message.data) != cells or cells == 0:
         raise MapError(f"{name} has {len(message.data)} values for {info.width} x {info.height} cells; "
                        "give width times height values, at least one")
-    yaw = _yaw(f"{name}: its origin", info.origin.orientation, MapError)
+    rotation = info.origin.orientation
+    yaw = _yaw(f"{name}: its origin", rotation, MapError)
+    if (tilt := _tilt(rotation)) > MAP_TILT:
+        raise MapError(f"{name}: its origin has {_written(rotation)}, which leans by {tilt:.3g} rad; turn it about z only "
+                       "(x and y 0)")
     data = np.frombuffer(message.data, dtype=np.int8).reshape(info.height, info.width)
     # The field is a float32; the decimal it stands for gives the same map as the file that was published.
     resolution = float(str(np.float32(info.resolution)))
@@ -209,14 +230,29 @@ def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
 
 
 def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:
-    """Return the rotation about z of a quaternion [rad], in (-pi, pi]."""
-    written = f"x {q.x}, y {q.y}, z {q.z}, w {q.w}"
-    norm = math.hypot(q.x, q.y, q.z, q.w)
-    if not abs(norm - 1) <= NORM_TOLERANCE:  # written so that NaN is refused too
-        raise error(f"{what} has the quaternion {written}, which is no rotation: its norm is {norm:.6g}; "
+    """Return the direction of a rotation's x axis in the plane [rad], in (-pi, pi]."""
+    norm = _norm(q)
+    if not LEAST_NORM <= norm < math.inf:  # written so that NaN is refused too
+        raise error(f"{what} has {_written(q)}, which is no rotation: its norm is {norm:.6g}; "
                     "normalise it (no rotation is w 1).")
-    tilt = 2 * math.asin(min(1.0, math.hypot(q.x, q.y) / norm))
-    if tilt > TILT_TOLERANCE:
-        raise error(f"{what} has the quaternion {written}, which leans by {tilt:.3g} rad; "
-                    "turn it about z only (x and y 0).")
-    return math.remainder(2 * math.atan2(q.z, q.w), 2 * math.pi)
+    if q.x == q.y == 0:  # then exact
+        return math.remainder(2 * math.atan2(q.z, q.w), 2 * math.pi)
+    w, x, y, z = (component / norm for component in (q.w, q.x, q.y, q.z))
+    along, across = w * w + x * x - y * y - z * z, 2 * (w * z + x * y)
+    if math.hypot(along, across) < math.sin(LEAST_ANGLE_TO_VERTICAL):
+        raise error(f"{what} has {_written(q)}, whose x axis is vertical to within "
+                    f"{math.degrees(LEAST_ANGLE_TO_VERTICAL):g} degree, so that it has no yaw; turn it about z (x and y 0).")
+    return math.atan2(across, along)
+
+
+def _written(q: Quaternion) -> str:
+    return f"the quaternion x {q.x}, y {q.y}, z {q.z}, w {q.w}"
+
+
+def _norm(q: Quaternion) -> float:
+    return math.hypot(q.x, q.y, q.z, q.w)
+
+
+def _tilt(q: Quaternion) -> float:
+    """Return the angle between a rotation's z axis and the vertical [rad]."""
+    return 2 * math.atan2(math.hypot(q.x, q.y), math.hypot(q.z, q.w))

@@ -1,5 +1,6 @@
 """Transforms of poses to the global frame, by tf2 where it is installed."""
 
+from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Transform
 from rclpy.node import Node
 from rclpy.time import Time
@@ -7,7 +8,7 @@ from rclpy.time import Time
 from dubins_rrt_ros.planning import InvalidPose, Status
 from dubins_rrt_ros.planning.problem import Pose
 
-from .conversions import bare_pose, pose_from, transformed
+from .conversions import bare_pose, doubts_about, pose_from, transformed
 from .request import Refusal
 
 try:
@@ -22,6 +23,7 @@ class Frames:
     def __init__(self, node: Node, frame: str):
         self._logger = node.get_logger()
         self._frame = frame
+        self._doubts: set[tuple[str, str]] = set()  # that were logged: the pose's name and the kind
         if tf2_ros is not None:
             self._buffer = tf2_ros.Buffer()
             self._listener = tf2_ros.TransformListener(self._buffer, node)
@@ -38,9 +40,18 @@ class Frames:
         elif frame != self._frame:
             pose = transformed(pose, self._latest(name, frame))
         try:
-            return pose_from(name, pose)
+            planar = pose_from(name, pose)
         except InvalidPose as error:
             raise Refusal(Status.INVALID_POSE, str(error)) from None
+        self._warn_once(name, pose)
+        return planar
+
+    def _warn_once(self, name: str, pose: PoseMessage) -> None:
+        """Log what is unusual about a pose that is taken: each kind once for starts, and once for goals."""
+        for kind, doubt in doubts_about(name, pose).items():
+            if (name, kind) not in self._doubts:
+                self._doubts.add((name, kind))
+                self._logger.warning(doubt)
 
     def _latest(self, name: str, frame: str) -> Transform:
         if tf2_ros is None:

@@ -10,7 +10,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
-from support.harness import Conversation, assert_says
+from support.harness import Conversation, assert_says, occupancy
 
 from dubins_rrt_ros.node.conversions import pose_message
 from dubins_rrt_ros.planning import OCCUPIED, UNKNOWN, GridMap, save_map
@@ -59,12 +59,10 @@ def turned(**components):
 
 POSITIONS = [(at(**{axis: value}), [f"{axis} {value}", "finite"]) for axis in "xyz" for value in (NAN, INF, -INF)]
 ROTATIONS = [(turned(**components), ["no rotation", "norm", "normalise"]) for components in (
-    {}, {"w": 2.0}, {"w": 0.9}, {"w": 1.01}, {"z": 0.5, "w": 0.5}, {"x": 1.0, "y": 1.0, "z": 1.0, "w": 1.0},
-    {"w": 1e-300}, {"w": 1e300}, {"z": 1.7e308, "w": 1.7e308}, {"w": NAN}, {"w": INF}, {"w": -INF}, {"z": NAN, "w": 1.0},
-    {"x": NAN, "w": 1.0}, {"y": INF, "w": 1.0})]
-TILTS = [(turned(**components), [f"leans by {tilt}", "about z only"]) for components, tilt in (
-    ({"x": math.sin(0.25), "w": math.cos(0.25)}, "0.5 rad"), ({"y": math.sin(0.05), "w": math.cos(0.05)}, "0.1 rad"),
-    ({"x": 1.0}, "3.14 rad"), ({"y": -1.0}, "3.14 rad"), ({"x": 0.5, "y": 0.5, "z": 0.5, "w": 0.5}, "1.57 rad"))]
+    {}, {"w": 9e-4}, {"z": 5e-4, "w": 5e-4}, {"w": 1e-300}, {"z": 1.7e308, "w": 1.7e308}, {"w": NAN}, {"w": INF}, {"w": -INF},
+    {"z": NAN, "w": 1.0}, {"x": NAN, "w": 1.0}, {"y": INF, "w": 1.0})]
+VERTICAL = [(turned(y=math.sin(angle / 2), w=math.cos(angle / 2)), ["x axis is vertical", "no yaw"])
+            for angle in (math.pi / 2, -math.pi / 2, math.radians(89.5))]
 
 
 def said_of(talk, way, pose, frame="map"):
@@ -85,7 +83,7 @@ WAYS = {"start_pose": "start", "initialpose": "start", "goal_pose": "goal", "sta
         "goal of get_plan": "goal"}
 
 
-@pytest.mark.parametrize(("pose", "words"), POSITIONS + ROTATIONS + TILTS)
+@pytest.mark.parametrize(("pose", "words"), POSITIONS + ROTATIONS + VERTICAL)
 def test_a_pose_that_is_none_is_refused_whichever_way_it_comes(talk, pose, words):
     for way, name in WAYS.items():
         assert_says(said_of(talk, way, pose), "212", "INVALID_POSE", f"The {name} pose", *words)
@@ -98,11 +96,29 @@ def test_a_pose_in_a_frame_that_nobody_knows_is_refused_whichever_way_it_comes(t
 
 
 @pytest.mark.parametrize("pose", [
-    at(x=8.5, z=1e300), turned(w=-1.0), turned(w=1.0005), turned(z=-0.70711, w=0.70711), turned(x=0.004, w=1.0)])
-def test_a_pose_that_is_rounded_or_in_the_air_is_taken(talk, pose):
+    at(x=8.5, z=1e300), turned(w=-1.0), turned(w=1.0005), turned(z=-0.70711, w=0.70711), turned(x=0.004, w=1.0), turned(w=0.9),
+    turned(w=2.0), turned(w=1e300), turned(z=0.5, w=0.5), turned(z=0.7, w=0.7), turned(x=1.0, y=1.0, z=1.0, w=1.0),
+    turned(x=math.sin(0.25), w=math.cos(0.25)), turned(y=math.sin(0.05), w=math.cos(0.05)), turned(x=1.0), turned(y=-1.0)])
+def test_a_pose_that_is_rounded_leans_or_is_in_the_air_is_taken(talk, pose):
     talk.start(START)
     assert talk.goal(pose)["error_name"] == "NONE"
     assert talk.plan(pose, GOAL)[0]["error_name"] == "NONE"
+
+
+@pytest.mark.parametrize(("components", "words"), [
+    ({"y": math.sin(0.1), "w": math.cos(0.1)}, "leans by 11.5 degrees"), ({"w": 2.0}, "norm 2")])
+def test_what_is_unusual_about_a_pose_is_warned_of_once(module_planners, talk, components, words):
+    process = module_planners.start(**QUICK)
+    client = module_planners.client()
+    client.publish_map(occupancy(box().data))
+    fresh = Conversation(process, client)
+    for _ in range(3):
+        fresh.plan(turned(**components), GOAL)
+        fresh.plan(START, turned(**components))
+    client.wait_for_word(f"The goal pose {'leans' if 'y' in components else 'has'}")
+    warnings = [line for line in process.output.splitlines() if words in line]
+    assert [line for line in warnings if "WARN" in line] == warnings
+    assert len(warnings) == 2, "one for the start and one for the goal"
 
 
 def said_of_start(talk, way, start):
