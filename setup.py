@@ -32,7 +32,7 @@ def compiled_kernels():
 
 
 def installed(folder, *patterns):
-    """A data_files entry that installs files of the source tree into the package's share folder."""
+    """Return a data_files entry that installs files of the source tree into the package's share folder."""
     return f"share/{PACKAGE}/{folder}".rstrip("/"), sorted(path for pattern in patterns for path in glob(pattern))
 
 

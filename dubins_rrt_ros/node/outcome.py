@@ -1,4 +1,4 @@
-"""How a request ended: as a plan, a refusal or a defect. Nothing that comes in ends the node."""
+"""The outcome of a request: a plan, a refusal or a defect. Nothing that comes in ends the node."""
 
 import traceback
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Whether the published path is still free on a map that came after it."""
+"""The check whether the published path is still free on a newer map."""
 
 from collections.abc import Callable
 from dataclasses import replace

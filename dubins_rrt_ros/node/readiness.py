@@ -1,4 +1,4 @@
-"""What the node needs before it can plan: which of it is missing, why, and what would bring it."""
+"""The node's needs before it can plan: which are missing, why, and what would provide them."""
 
 from rclpy.node import Node
 

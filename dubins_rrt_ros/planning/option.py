@@ -20,7 +20,7 @@ class OptionError(PlanningError, ValueError):
 
 
 class TextForm(NamedTuple):
-    """How an option whose values are structured is written in files, flags and parameters.
+    """The text form of an option whose values are structured, for files, flags and parameters.
 
     Attributes:
         read: takes a text or a value and returns the value, or raises OptionError.
@@ -90,10 +90,10 @@ class Option(NamedTuple):
         return not self.choices or value in self.choices
 
 
-def option(default: Any, help: str, *, unit: str = "", low: float | None = None, high: float | None = None,
+def option(default: Any, description: str, *, unit: str = "", low: float | None = None, high: float | None = None,
            choices: tuple[str, ...] = (), text_form: TextForm | None = None) -> Any:
     """Return a dataclass field that is an option."""
-    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": help, "text_form": text_form}
+    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": description, "text_form": text_form}
     return dataclasses.field(default=default, metadata=metadata)
 
 

@@ -26,7 +26,7 @@ class PlanFileError(PlanningError, ValueError):
 
 
 def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
-    """`plan` as what JSON can hold.
+    """Return a plan as what JSON can hold.
 
     Args:
         plan: with a path or without: then length and its like are None, curves and poses empty.
@@ -48,7 +48,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
 
 
 def _number(value: float | None) -> float | None:
-    """`value` as a float; None also for the infinite lower bound of an unreachable goal, which JSON cannot hold."""
+    """Return a float; None also for the infinite lower bound of an unreachable goal, which JSON cannot hold."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
@@ -57,8 +57,8 @@ def _curve_document(curve: DubinsCurve) -> dict[str, Any]:
             "lengths": [float(length) for length in curve.lengths]}
 
 
-def read_request(document: Mapping[str, Any], map: Map) -> tuple[Problem, Settings]:
-    """The request that a document answers, for planning it again on `map`.
+def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, Settings]:
+    """Return the request that a document answers, for planning it again on a map.
 
     The time limit is lifted to the largest allowed, and the sample budget is what was drawn: a deadline and a
     cancellation only cut the sequence of samples short, so the same number of them gives the same path on a machine of
@@ -72,14 +72,14 @@ def read_request(document: Mapping[str, Any], map: Map) -> tuple[Problem, Settin
     vehicle = Vehicle(**_known(Vehicle, _field(document, "vehicle", Mapping), "vehicle"))
     request = {item.name: fields.pop(item.name) for item in options(Problem) if item.name in fields}
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
-    problem = Problem(map, vehicle, start, goal, **request)
+    problem = Problem(world_map, vehicle, start, goal, **request)
     fields = _known(Settings, fields, "settings")
     drawn = _field(document, "samples", int)
     return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"]})
 
 
 def read_path(document: Mapping[str, Any]) -> Path | None:
-    """The path in a document, or None where there is none.
+    """Return the path in a document, or None where there is none.
 
     Raises:
         PlanFileError: something is missing, or is of another type.
@@ -123,7 +123,7 @@ def _field(document: Mapping[str, Any], name: str, kind: type) -> Any:
 
 
 def _known(cls: type, fields: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """`fields`, which must be exactly the options of `cls`."""
+    """Return the fields as a dict; they must be exactly the options of `cls`."""
     difference = {item.name for item in options(cls)} ^ set(fields)
     if difference:
         raise PlanFileError(f"its field {name} differs from what version {__version__} knows, in "

@@ -1,4 +1,4 @@
-"""What to plan: map, vehicle, start, goal and what counts as reaching the goal."""
+"""The request to the planner: map, vehicle, start, goal and what counts as reaching the goal."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from .vehicle import Vehicle
 Pose = tuple[float, float, float]
 
 
-#: A yaw beyond this has lost too many digits of its direction to rounding [rad].
+#: Largest absolute yaw of a pose [rad]; beyond it, rounding has taken too many digits of the direction.
 LARGEST_YAW = 1e6
 
 
@@ -23,16 +23,19 @@ class InvalidPose(PlanningError, ValueError):
 
 
 class PreparedMap(Protocol):
-    """What a problem wants to know of a `World`."""
+    """The part of a `World` that a problem needs."""
 
     @property
-    def map(self) -> Map: ...
+    def map(self) -> Map:
+        """The map."""
 
     @property
-    def vehicle(self) -> Vehicle: ...
+    def vehicle(self) -> Vehicle:
+        """The vehicle that the map is prepared for."""
 
     @property
-    def allow_unknown(self) -> bool: ...
+    def allow_unknown(self) -> bool:
+        """True if unknown space counts as free."""
 
 
 @documented
@@ -63,14 +66,15 @@ class Problem:
     allow_unknown: bool = option(False, "treat unknown space as free")
     world: PreparedMap | None = field(default=None, repr=False)
 
-    def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None, start: Sequence[float] = (),
-                 goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0, goal_tolerance_yaw: float = 0.0,
-                 any_goal_heading: bool = False, allow_unknown: bool = False, world: PreparedMap | None = None):
+    def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None,  # noqa: A002 - a public name
+                 start: Sequence[float] = (), goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0,
+                 goal_tolerance_yaw: float = 0.0, any_goal_heading: bool = False, allow_unknown: bool = False,
+                 world: PreparedMap | None = None):
         """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
         if not isinstance(map, GridMap | PolygonMap):
             _check_fit(map, vehicle, allow_unknown)
             world = map
-            map, vehicle, allow_unknown = world.map, world.vehicle, world.allow_unknown
+            map, vehicle, allow_unknown = world.map, world.vehicle, world.allow_unknown  # noqa: A001
         if not isinstance(vehicle, Vehicle):
             raise TypeError(f"the vehicle is {quoted(vehicle)}; give a Vehicle, or a World in place of map and vehicle")
         if world is not None and (world.map, world.vehicle, world.allow_unknown) != (map, vehicle, allow_unknown):

@@ -1,4 +1,4 @@
-"""What plan() returns."""
+"""The answer of plan(): status, path, tree and figures."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ from .vehicle import Point
 
 
 class Status(IntEnum):
-    """How a request ended; 0 and 200 to 208 are Nav2's numbers for ComputePathToPose."""
+    """The end of a request; 0 and 200 to 208 are Nav2's numbers for ComputePathToPose."""
 
     NONE = 0
     UNKNOWN = 200
@@ -103,7 +103,7 @@ class Plan:
 
     @property
     def gap(self) -> float | None:
-        """length / lower_bound - 1, 0 for a path of length 0, infinite where the bound says nothing, None without a path."""
+        """The ratio length / lower_bound - 1: 0 for a path of length 0, infinite for a bound of 0, None without a path."""
         return None if self.path is None else gap_above(self.lower_bound, self.path.length)
 
     def check(self) -> None:
@@ -187,7 +187,7 @@ def gap_above(lower_bound: float, length: float) -> float:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a request has come.
+    """The state of a request under way.
 
     Attributes:
         samples: number of samples drawn so far.

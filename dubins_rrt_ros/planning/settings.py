@@ -1,4 +1,4 @@
-"""How to plan: one frozen dataclass whose fields are options."""
+"""The settings of the planner: one frozen dataclass whose fields are options."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What messages say of values: short, on one line, and in characters that any terminal can show."""
+"""Values in messages: short, on one line, and in characters that any terminal can show."""
 
 import math
 import reprlib

@@ -22,8 +22,8 @@ class World:
         allow_unknown: True if the vehicle may drive through unknown space.
     """
 
-    def __init__(self, map: Map, vehicle: Vehicle, allow_unknown: bool = False):
-        self.map, self.vehicle, self.allow_unknown = map, vehicle, allow_unknown
+    def __init__(self, world_map: Map, vehicle: Vehicle, allow_unknown: bool = False):
+        self.map, self.vehicle, self.allow_unknown = world_map, vehicle, allow_unknown
 
     @cached_property
     def field(self) -> ClearanceField:
@@ -39,13 +39,13 @@ class World:
         """Prepare the same map for another vehicle: the clearance is shared, and this world stays as it is."""
         return prepare(self.map, vehicle, self.allow_unknown, self)
 
-    def updated(self, map: Map) -> "World":
+    def updated(self, new_map: Map) -> "World":
         """Prepare another map, which differs in places: what is the same as here is reused, and this world stays as it is.
 
         Returns:
             Bit for bit the world that `prepare` makes of the other map.
         """
-        return prepare(map, self.vehicle, self.allow_unknown, self)
+        return prepare(new_map, self.vehicle, self.allow_unknown, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return World, (self.map, self.vehicle, self.allow_unknown)
@@ -54,7 +54,8 @@ class World:
         return f"World(map={self.map.name!r}, vehicle={self.vehicle}, allow_unknown={self.allow_unknown})"
 
 
-def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False, previous: World | None = None) -> World:
+def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A002 - a public name
+            previous: World | None = None) -> World:
     """Compute what depends on map and vehicle alone, so that requests need not wait for it.
 
     Args:

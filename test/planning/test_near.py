@@ -27,7 +27,7 @@ class Inner:
         self.field = ClearanceField(map)
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
-        self.grown = SearchTree(root, radius, low, high - low)
+        self.grown = SearchTree(root=root, radius=radius, corner=low, extent=high - low)
         self.grower = RrtKernel(tree=self.grown, checker=self.field.collision_checker(VEHICLE), step=step,
                                 near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=(1e6, 1e6, 0.0), tolerance_xy=0.0,
                                 tolerance_yaw=0.0)

@@ -34,8 +34,8 @@ def test_the_search_finds_the_widest_passage(seed):
     start, *targets = (tuple(at) for at in rng.integers(0, shape, (4, 2)).tolist())
     is_target = np.zeros(shape, np.int8)
     is_target[tuple(np.transpose(targets))] = 1
-    search = WidestPathSearch(ClearanceField(map).kernel, first.tolist(), step.tolist(), shape, is_target.ravel(), least,
-                              enough)
+    search = WidestPathSearch(clearance=ClearanceField(map).kernel, first=first.tolist(), along=step.tolist(), shape=shape,
+                              is_target=is_target.ravel(), least=least, enough=enough)
     found, passage = search.widest_path(start[0] * shape[1] + start[1])
     assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
     if found == 0:

@@ -1,1 +1,1 @@
-"""What the commands share: flags, requests, output, pictures."""
+"""Parts that the commands share: flags, requests, output, pictures."""

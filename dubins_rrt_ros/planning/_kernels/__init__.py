@@ -1,10 +1,10 @@
-"""The compiled room: Cython in pure Python mode. Numbers and arrays in, numbers and arrays out.
+"""The compiled inner loops: Cython in pure Python mode, which takes and returns numbers and arrays alone.
 
-Where a compiler was at hand these modules are extensions that drop the interpreter lock; else the interpreter runs the
-same files, some hundred times slower.
+Installed with a compiler, these modules are extensions that release the interpreter lock; without one, the interpreter runs
+the same files, some hundred times slower. A `.pxd` beside a module declares the C types of its names.
 """
 
 from .dubins import COMPILED as COMPILED
 
-#: A length beyond all others, as kernels take and give it.
+#: Length that stands for infinity in the arguments and results of the kernels.
 UNLIMITED = 1e300

@@ -1,10 +1,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Distances to obstacles, and the walk along a curve that leaves no gap between its samples.
+"""Distances to obstacles, and the check of an arc by conservative advancement, which leaves no gap between its samples.
 
-A field holds, for each cell of a raster over the map, a lower bound of the clearance anywhere in the cell. Where it does
+The field holds, for each cell of a raster over the map, a lower bound of the clearance anywhere in the cell. Where that does
 not decide, the exact distance does: to the squares of a grid's occupied cells, or to the edges of polygons.
 
-What the walk guarantees (conservative advancement). The clearance changes by at most a metre per metre (it is 1-Lipschitz). A
+Guarantee of conservative advancement. The clearance changes by at most a metre per metre (it is 1-Lipschitz). A
 sample is taken as free where its clearance is at least `required_clearance + margin`; the next one lies
 `clearance - required_clearance + margin / 2` ahead. Between two such samples s apart, with clearances c and c', the clearance is
 at least (c + c' - s) / 2 >= required_clearance + margin / 4. So a curve that passes has more than the required clearance
@@ -24,7 +24,7 @@ else:
 
 @cython.cclass
 class Clearance:
-    """A field of lower bounds [m] over a raster; `exact` is the subclasses'. A cell below 0 is an obstacle altogether."""
+    """A field of lower bounds [m] over a raster; subclasses have the exact distance. A cell below 0 lies in an obstacle."""
 
     def __init__(self, field, resolution: cython.double, origin, margin: cython.double):
         self.field = field
@@ -36,11 +36,11 @@ class Clearance:
         self.height = field.shape[0] * resolution
 
     def exact(self, x, y):
-        """The distance from a point in the raster's frame to the edge of the map."""
+        """Return the distance from a point in the raster's frame to the edge of the map."""
         return min(min(x, self.width - x), min(y, self.height - y))
 
     def at_least(self, x, y, enough):
-        """The clearance at a point of the map's frame, or a lower bound of it that is at least `enough`; 0 outside."""
+        """Return the clearance at a point of the map's frame, or a lower bound of it that is at least `enough`; 0 outside."""
         dx: cython.double = x - self.x0
         dy: cython.double = y - self.y0
         u: cython.double = self.cos_yaw * dx + self.sin_yaw * dy
@@ -59,7 +59,7 @@ class Clearance:
         return self.at_least(x, y, required_clearance + self.margin) >= required_clearance + self.margin
 
     def arc_is_free(self, pose, radius, turn, length, s, required_clearance):
-        """Walk an arc from `s` on; return how far the next sample lies beyond its end, or -1 where it hits."""
+        """Check an arc from `s` on; return how far the next sample lies beyond its end, or -1 where it is not free."""
         if s > length:
             return s - length
         sin_theta: cython.double = sin(pose.theta)
@@ -76,12 +76,12 @@ class Clearance:
         return s - length
 
     def sweep_is_clear(self, corners, first, end, along, across, spans):
-        """Whether a convex polygon that moves straight touches no obstacle and stays on the map.
+        """Return whether a convex polygon that moves straight touches no obstacle and stays on the map.
 
         Args:
-            corners: its corners are those from `first` up to `end`, without that, counter-clockwise, in the raster's frame [m].
-            along, across: how far it moves [m].
-            spans: (rows, 2) for the raster's rows, to work in.
+            corners: (n, 2), of which `corners[first:end]` are the polygon's, counter-clockwise, in the raster's frame [m].
+            along, across: the motion in that frame [m].
+            spans: (rows, 2) working memory: the least and the greatest x that the polygon covers in each row of the raster.
         """
         left: cython.double = UNLIMITED
         right: cython.double = -UNLIMITED
@@ -109,8 +109,8 @@ class Clearance:
             before = i
         return self.spans_are_clear(first_row, last_row, spans, corners, first, end, along, across)
 
-    def span(self, x0, y0, x1, y1, spans ):
-        """Widen the spans of the rows that an edge leads through by what it covers of them."""
+    def span(self, x0, y0, x1, y1, spans):
+        """Widen the spans of the rows that an edge crosses by the part of it in each row."""
         if y1 < y0:
             x0, y0, x1, y1 = x1, y1, x0, y0
         row: cython.int = self.row_of(y0)
@@ -132,7 +132,7 @@ class Clearance:
     @cython.inline
     @cython.exceptval(check=False)
     def row_of(self, y: cython.double) -> cython.int:
-        """The row of the raster that holds a y in its frame."""
+        """Return the row of the raster that holds a y in its frame."""
         return min(cython.cast(cython.int, y / self.resolution), cython.cast(cython.int, self.field.shape[0]) - 1)
 
     @cython.cfunc
@@ -140,11 +140,11 @@ class Clearance:
     @cython.inline
     @cython.exceptval(check=False)
     def column_of(self, x: cython.double) -> cython.int:
-        """The column of the raster that holds an x in its frame."""
+        """Return the column of the raster that holds an x in its frame."""
         return min(cython.cast(cython.int, x / self.resolution), cython.cast(cython.int, self.field.shape[1]) - 1)
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
-        """Whether no obstacle is touched by what `sweep_is_clear` asks for, of which `spans` are the parts in the rows."""
+        """Return what `sweep_is_clear` does, given the spans of the rows; subclasses know the obstacles."""
         return True
 
     def distances(self, points: cython.double[:, ::1], out: cython.double[::1]):
@@ -159,7 +159,7 @@ class Clearance:
 class GridClearance(Clearance):
     """Clearance from the squares of occupied cells.
 
-    `row_gap` holds for each cell how far away the next occupied ones in its row are, as `distance.measure_row_gaps` writes it.
+    `row_gap` holds the distances of each cell to the next occupied ones in its row, as `distance.measure_row_gaps` packs them.
     """
 
     def __init__(self, field, resolution, origin, margin, row_gap):
@@ -180,7 +180,7 @@ class GridClearance(Clearance):
         return gap * gap
 
     def exact(self, x, y):
-        """The distance to the nearest occupied square or the map's edge: rows outward until they are too far."""
+        """Return the distance to the nearest occupied square or the map's edge, row by row outward until rows are too far."""
         nearest: cython.double = Clearance.exact(self, x, y)
         nearest = nearest * nearest
         rows: cython.int = cython.cast(cython.int, self.field.shape[0])
@@ -201,7 +201,7 @@ class GridClearance(Clearance):
         return sqrt(nearest)
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
-        """Whether no cell in the spans is occupied: from each, go on to where the next occupied one to the right may be."""
+        """Return whether no cell in the spans is occupied; go from each to where the next occupied one to the right may be."""
         row: cython.int
         column: cython.int
         last: cython.int
@@ -221,8 +221,9 @@ class GridClearance(Clearance):
 class PolygonClearance(Clearance):
     """Clearance from the edges of polygons.
 
-    `edges` is (m, 4): x, y, x, y of both ends in the raster's frame. Cell c can have `edge_of[first_edge[c]:first_edge[c + 1]]`
-    nearest. The distance has no sign; a walk that starts in free space cannot get into an obstacle but through its edge.
+    `edges` is (m, 4): x, y, x, y of both ends in the raster's frame. The nearest edge to any point of cell c is among
+    `edge_of[first_edge[c]:first_edge[c + 1]]`. The distance has no sign: an obstacle is entered only
+    through an edge.
     """
 
     def __init__(self, field, resolution, origin, margin, edges, first_edge, edge_of):
@@ -232,7 +233,7 @@ class PolygonClearance(Clearance):
         self.edge_of = edge_of
 
     def exact(self, x, y):
-        """The distance to the nearest edge."""
+        """Return the distance to the nearest edge."""
         row: cython.int = self.row_of(y)
         column: cython.int = self.column_of(x)
         cell: cython.Py_ssize_t = row * self.field.shape[1] + column
@@ -243,7 +244,7 @@ class PolygonClearance(Clearance):
         return sqrt(nearest)
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
-        """Whether no edge is touched: where one is, it is the nearest one to a point of a cell in the spans, at no distance."""
+        """Return whether no edge is touched; one that is touched is the nearest of a cell in the spans."""
         row: cython.int
         column: cython.int
         cell: cython.Py_ssize_t
@@ -264,7 +265,7 @@ class PolygonClearance(Clearance):
 @cython.exceptval(check=False)
 def sweep_meets_segment(corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
                         across: cython.double, edges: cython.double[:, ::1], edge: cython.int) -> cython.bint:
-    """Whether a convex polygon that moves straight touches an edge: no line along a side of either keeps them apart."""
+    """Return whether a convex polygon that moves straight touches an edge: no line along a side of either separates them."""
     before: cython.int = end - 1
     i: cython.int
     for i in range(first, end):
@@ -286,7 +287,7 @@ def sweep_meets_segment(corners: cython.double[:, ::1], first: cython.int, end: 
 def lies_beyond(normal_x: cython.double, normal_y: cython.double, corners: cython.double[:, ::1], first: cython.int,
                 end: cython.int, along: cython.double, across: cython.double, edges: cython.double[:, ::1], edge: cython.int
                 ) -> cython.bint:
-    """Whether an edge is farther in a direction than all of a convex polygon that moves straight."""
+    """Return whether an edge lies farther in a direction than a convex polygon that moves straight ever gets."""
     farthest: cython.double = -UNLIMITED
     i: cython.int
     for i in range(first, end):
@@ -300,7 +301,7 @@ def lies_beyond(normal_x: cython.double, normal_y: cython.double, corners: cytho
 @cython.nogil
 @cython.exceptval(check=False)
 def squared_to_segment(x: cython.double, y: cython.double, edges: cython.double[:, ::1], edge: cython.int) -> cython.double:
-    """The squared distance from a point to an edge."""
+    """Return the squared distance from a point to an edge."""
     dx: cython.double = edges[edge, 2] - edges[edge, 0]
     dy: cython.double = edges[edge, 3] - edges[edge, 1]
     px: cython.double = x - edges[edge, 0]
@@ -317,9 +318,9 @@ def squared_to_segment(x: cython.double, y: cython.double, edges: cython.double[
 @cython.inline
 @cython.exceptval(check=False)
 def left_gap(row_gap: cython.int) -> cython.int:
-    """Return how many cells away the next blocked cell to the left is, at least, of what `distance.measure_row_gaps` packs.
+    """Return a lower bound of the distance to the next blocked cell to the left, in cells, from a packed `row_gap`.
 
-    The farther one of the two counts as one cell farther than the nearer: it is at least that, and not the nearest.
+    It is exact where that is the nearer of both sides; else it is one more than the nearer one, which then decides.
     """
     return (row_gap >> 2) + (row_gap & 1)
 
@@ -329,5 +330,5 @@ def left_gap(row_gap: cython.int) -> cython.int:
 @cython.inline
 @cython.exceptval(check=False)
 def right_gap(row_gap: cython.int) -> cython.int:
-    """Return the same to the right."""
+    """Return the same for the next blocked cell to the right."""
     return (row_gap >> 2) + (row_gap >> 1 & 1)

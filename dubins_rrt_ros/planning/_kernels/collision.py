@@ -1,16 +1,16 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Collision checkers: whether the vehicle touches an obstacle at a pose, or anywhere along a curve.
+"""Collision checkers: does the vehicle touch an obstacle at a pose, or anywhere along a curve?
 
-A disc is a matter of the clearance alone. For a polygon the gap between it and the obstacles decides, which is at least that of
-the discs that cover it; where these are too coarse, the polygon made wider by some distance is held against the obstacles, which
-is exact, and the gap is at least that distance.
+A disc is free where the clearance is great enough. For a polygon the gap between it and the obstacles decides. A lower bound of
+that is the gap of the discs that cover the polygon; where they are too coarse, the polygon widened by some distance is checked
+against the obstacles exactly, and if it is clear, the gap is at least that distance.
 
-What the walk guarantees for a polygon. No point of the body moves faster than `speed`, in metres per metre along the curve, so
-neither does the gap change faster. A pose is free with a gap of at least `margin`; the next one is so far ahead that no point
-moves by more than `gap + margin / 2` until there. Between two such poses, with gaps g and g', the gap is at least
-(g + g' - (g + margin / 2)) / 2 >= margin / 4. Straight on the body covers the convex hull of its first and last place, which is
-held against the obstacles as a whole. A polygon made wider by e reaches no farther than sqrt(2) e beyond itself, so a curve that
-keeps a gap of sqrt(2) margin always passes.
+Guarantee of conservative advancement for a polygon. No point of the body moves faster than `speed`, in metres per metre along the
+curve, so neither does the gap change faster. A pose is free with a gap of at least `margin`; the next one is so far ahead that no
+point moves by more than `gap + margin / 2` until there. Between two such poses, with gaps g and g', the gap is at least
+(g + g' - (g + margin / 2)) / 2 >= margin / 4. On a straight arc the body covers the convex hull of its first and last place,
+which is checked as a whole. A polygon widened by e reaches no farther than sqrt(2) e beyond itself, so a curve that keeps a gap
+of sqrt(2) margin always passes.
 """
 
 import cython
@@ -70,8 +70,10 @@ class CollisionChecker:
         return self.pose_is_free(pose)
 
     def arc_is_free(self, pose, radius, turn, length, walked):
-        """Walk an arc, the first `walked` of which is known to be free; return how far the next sample lies beyond its end, or -1
-        where the vehicle hits."""
+        """Check an arc whose first `walked` metres are known to be free.
+
+        Return how far the next sample lies beyond the end of the arc, or -1 where the vehicle collides.
+        """
         return self.clearance.arc_is_free(pose, radius, turn, length, walked, self.required_clearance)
 
     def is_pose_free(self, pose) -> bool:
@@ -85,18 +87,18 @@ class CollisionChecker:
 
 @cython.cclass
 class PolygonChecker(CollisionChecker):
-    """The checker of a polygon, as `collision/footprint.py` prepares it. It works in arrays of its own: no two threads may share
-    one."""
+    """The checker of a polygon, as `collision/footprint.py` prepares it. It has working memory: no two threads may share one."""
 
     def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, worth):
-        """
+        """Make the checker of a polygon.
+
         Args:
             required_clearance: radius of the largest disc around the reference point inside the polygon [m].
-            discs: (m, 4): the discs that cover it: x, y, radius, and the radius of a disc there inside it [m].
-            corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and how far they move, per metre that the
-                part is made wider by.
-            first_corner: (p + 1,) int32: where each part's corners begin.
-            worth: where the discs give at least this gap, they are exact enough [m].
+            discs: (m, 4): the discs that cover it: x, y, radius, and the radius of a disc around the same centre inside it [m].
+            corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and their displacement per metre of
+                widening.
+            first_corner: (p + 1,) int32: the index of each part's first corner, and n.
+            worth: gap from which on the bound by the discs is good enough [m].
         """
         CollisionChecker.__init__(self, clearance, required_clearance)
         self.discs, self.corners, self.first_corner, self.worth = discs, corners, first_corner, worth
@@ -111,13 +113,13 @@ class PolygonChecker(CollisionChecker):
         return self.is_clear(pose, self.clearance.margin, 0)
 
     def arc_is_free(self, pose, radius, turn, length, walked):
-        """`walked` and what is returned are how far the fastest point of the vehicle moves."""
+        """Check an arc; `walked` and the result are in metres that the fastest point of the vehicle moves."""
         if turn == 0:
             return self.straight_is_free(pose, length, walked)
         return self.turn_is_free(pose, radius, turn, length, walked)
 
     def straight_is_free(self, pose, length, walked):
-        """`arc_is_free` straight on: where the discs do not decide, the rest is looked at as a whole."""
+        """Check a straight arc; where the discs do not decide, its rest is checked as a whole."""
         found: cython.double
         at: Pose
         while walked <= length:
@@ -131,7 +133,7 @@ class PolygonChecker(CollisionChecker):
         return walked - length
 
     def turn_is_free(self, pose, radius, turn, length, walked):
-        """`arc_is_free` in a turn."""
+        """Check a turn."""
         speed: cython.double = self.speed(radius, turn)
         sin_theta: cython.double = sin(pose.theta)
         cos_theta: cython.double = cos(pose.theta)
@@ -145,7 +147,7 @@ class PolygonChecker(CollisionChecker):
         return (s - length) * speed
 
     def speed(self, radius, turn):
-        """Return how fast the fastest point of the vehicle moves in a turn, in metres per metre along it."""
+        """Return the speed of the fastest point of the vehicle in an arc, in metres per metre along it."""
         fastest: cython.double = 1
         i: cython.Py_ssize_t
         for i in range(self.corners.shape[0]):
@@ -155,7 +157,7 @@ class PolygonChecker(CollisionChecker):
     def gap(self, pose, expected):
         """Return a lower bound of the gap between vehicle and obstacles, at least `margin`; or CONTACT.
 
-        A good guess of what is `expected` saves work.
+        A good estimate in `expected` saves work.
         """
         found: cython.double = self.rough_gap(pose)
         if found == CONTACT or found >= self.worth:
@@ -168,8 +170,7 @@ class PolygonChecker(CollisionChecker):
         return self.clearance.margin if self.is_clear(pose, self.clearance.margin, 0) else CONTACT
 
     def rough_gap(self, pose):
-        """Return a lower bound of the gap, by the discs: negative where these touch obstacles; CONTACT where the vehicle does for
-        sure."""
+        """Return a lower bound of the gap, by the discs: negative where these touch obstacles, CONTACT where the vehicle must."""
         cos_theta: cython.double = cos(pose.theta)
         sin_theta: cython.double = sin(pose.theta)
         least: cython.double = UNLIMITED
@@ -185,7 +186,7 @@ class PolygonChecker(CollisionChecker):
         return least
 
     def is_clear(self, pose, wider, ahead):
-        """Return whether the vehicle, made wider and driven straight ahead from a pose, touches no obstacle."""
+        """Return whether the vehicle, widened and driven straight ahead from a pose, touches no obstacle."""
         cos_yaw: cython.double = self.clearance.cos_yaw
         sin_yaw: cython.double = self.clearance.sin_yaw
         x: cython.double = pose.x - self.clearance.x0

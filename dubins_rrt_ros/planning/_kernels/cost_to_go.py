@@ -1,12 +1,12 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""How far places are from a source around obstacles, for a disc that can turn on the spot: no path of the disc is shorter.
+"""Cost-to-go around obstacles: a lower bound of the length of any path of a disc that can turn on the spot.
 
-The map is cut into squares, each a block of the clearance's cells, and on those that may hold a free point the cost is that of
-`Eikonal`: continuous, and linear on triangles.
+The map is divided into squares, each a block of the clearance's cells. On those that may hold a free point the cost is that of
+`Eikonal`: continuous, and linear on triangles. It is symmetric, so the source may be the goal (cost-to-go) or the start.
 
-Why no path is shorter. No triangle has a gradient above 1, and where the source is the cost is not above 0. A path of the disc
-stays within squares that may hold a free point, and where two of them meet, in an edge or a node, both have the same cost: so
-along the path the cost is continuous and rises by a metre per metre at most. How the nodes got their costs does not matter.
+Proof of the bound. No triangle has a gradient above 1, and at the source the cost is at most 0. A path of the disc stays within
+squares that may hold a free point, and the cost is continuous where two of these meet, in an edge or a node. So along the path
+the cost rises by at most a metre per metre, however the nodes got their costs.
 """
 
 import cython
@@ -23,7 +23,7 @@ else:
     from .clearance import Clearance
     from .eikonal import FAR, Eikonal, squared_slopes
 
-#: Rounding, as a share and in metres.
+#: Allowance for rounding, both relative and in metres.
 ROUNDING = cython.declare(cython.double, 1e-9)
 
 
@@ -51,7 +51,7 @@ def free_squares(clearance: Clearance, block: cython.int, required_clearance: cy
 @cython.nogil
 @cython.exceptval(check=False)
 def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, required_clearance: cython.double) -> cython.bint:
-    """Whether a cell has a quarter whose centre is at most half a diagonal of it short of the clearance."""
+    """Return whether a cell may hold a free point: the centre of a quarter lacks at most half of the quarter's diagonal."""
     side: cython.double = clearance.resolution
     bound: cython.double = cython.cast(cython.double, clearance.field[row, column])
     if bound < 0 or bound >= required_clearance:
@@ -66,22 +66,23 @@ def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, requi
 
 @cython.cclass
 class CostToGoKernel:
-    """The costs of the nodes. Square `row * width + column` has the nodes of this number, of the next, and of those a row on.
+    """The costs of the nodes. Square s = row * width + column has the nodes s, s + 1, s + width and s + width + 1.
 
     Attributes:
         shape: (rows, columns) of the nodes with their border; `columns` is the width.
-        side: of a square [m].
-        is_bound: whether the costs are bounds; before `make_bound` they can be too high by some hundredths.
+        side: side of a square [m].
+        is_bound: whether the costs are lower bounds; before `make_bound` they can be some hundredths too high.
     """
 
     def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double, target):
-        """
+        """Start at the source.
+
         Args:
-            block: how many cells of the clearance's raster are the side of a square.
-            free: what `free_squares` returns for it.
+            block: side of a square, in cells of the clearance's raster.
+            free: what `free_squares` returns for this block.
             source: (x, y) in the map's frame [m].
-            tolerance: the source is all that is within this distance of it [m].
-            target: (x, y), the costs on the way to which are found first, or None.
+            tolerance: radius around `source` within which the cost is 0 [m].
+            target: (x, y) towards which costs are found first, or None.
         """
         self.clearance, self.side = clearance, block * clearance.resolution
         self.squares, self.shape, self.width, self.size = free, free.shape, free.shape[1], free.size
@@ -90,24 +91,24 @@ class CostToGoKernel:
         self.use(self.started_equation(target))
 
     def prepare_bound(self):
-        """Do the long part of `make_bound`, which leaves the costs as they are."""
+        """Do the long part of `make_bound`, without a change of the costs."""
         if self.flat is None:
             flat: Eikonal = self.started_equation(None)
             flat.flatten()
             self.flat = flat
 
     def make_bound(self):
-        """Make the costs as much lower as it takes that no path is shorter."""
+        """Lower the costs to lower bounds of the lengths of paths."""
         if self.is_bound:
             return
         self.prepare_bound()
         self.use(self.flat)
         self.is_bound = True
-        # At a point of the source the nodes around it have no more than their distances to it: sqrt(1 / 2) between them.
+        # The nodes around a point of the source have at most their distances to it: at the point, interpolated, sqrt(1 / 2).
         self.deduction = sqrt(0.5) if self.tolerance > 0 else self.squares_to(self.column, self.row)
 
     def started_equation(self, target):
-        """The equation, begun at the source."""
+        """Return the equation, started at the source."""
         equation: Eikonal = Eikonal(self.squares)
         if target is not None:
             equation.aim(*self.place(target[0], target[1]))
@@ -115,28 +116,28 @@ class CostToGoKernel:
         return equation
 
     def use(self, equation: Eikonal):
-        """Let the costs be those of an equation."""
+        """Use the costs of an equation."""
         self.equation, self.free, self.cost = equation, equation.free, equation.cost
 
     def finish(self):
-        """Find the costs of all nodes now, so that several threads may ask for them."""
+        """Compute the costs of all nodes now, so that several threads may read them."""
         self.equation.finish()
 
     def nodes(self):
-        """float64 of `shape`: the costs of the nodes [m]; 1e300 where no way is."""
+        """Return the costs of the nodes [m], float64 of `shape`; 1e300 where they cannot be reached."""
         self.finish()
         costs = np.asarray(self.cost).reshape(self.shape)
         return np.where(costs < FAR, (costs - self.deduction) * self.side * (1 - ROUNDING) - ROUNDING, FAR)
 
     def values(self, points: cython.double[:, ::1], out: cython.double[::1]):
-        """Write the costs at (n, 2) points of the map's frame to `out` [m]; 1e300 where no way is."""
+        """Write the costs at (n, 2) points of the map's frame to `out` [m]; 1e300 where they cannot be reached."""
         i: cython.Py_ssize_t
         with cython.nogil:
             for i in range(points.shape[0]):
                 out[i] = self.at(points[i, 0], points[i, 1])
 
     def descent(self, points: cython.double[:, ::1], out: cython.double[::1]):
-        """Write where the cost falls at (n, 2) points of the map's frame to `out` [rad]; NaN where there is none."""
+        """Write the headings of steepest descent at (n, 2) points of the map's frame to `out` [rad]; NaN where there is none."""
         self.finish()
         i: cython.Py_ssize_t
         with cython.nogil:
@@ -144,7 +145,7 @@ class CostToGoKernel:
                 out[i] = self.heading(points[i, 0], points[i, 1])
 
     def at(self, x, y):
-        """The cost at a point of the map's frame, not below 0; 1e300 where no way is."""
+        """Return the cost at a point of the map's frame [m], not below 0; 1e300 where it cannot be reached."""
         column: cython.double
         row: cython.double
         column, row = self.place(x, y)
@@ -152,7 +153,7 @@ class CostToGoKernel:
         return max(0.0, (cost - self.deduction) * self.side * (1 - ROUNDING) - ROUNDING) if cost < FAR else FAR
 
     def squares_to(self, column, row):
-        """The cost at a column and row in sides of a square, with what is to be deducted; 1e300 where no way is."""
+        """Return the cost at a column and row in sides of a square, before the deduction; 1e300 where it cannot be reached."""
         square: cython.int = self.square_at(column, row)
         if square < 0 or not self.free[square]:
             return FAR
@@ -162,7 +163,7 @@ class CostToGoKernel:
         return self.within(square, column - square % self.width, row - square // self.width)
 
     def heading(self, x, y):
-        """The heading in which the cost falls at a point, averaged over the nodes around it; NaN where it falls at none."""
+        """Return the heading of descent at a point, averaged over the nodes around it; NaN where the cost falls at none."""
         column: cython.double
         row: cython.double
         column, row = self.place(x, y)
@@ -187,14 +188,14 @@ class CostToGoKernel:
                      self.clearance.cos_yaw * along - self.clearance.sin_yaw * across)
 
     def place(self, x, y):
-        """Column and row of a point of the map's frame, whole numbers at the nodes."""
+        """Return the column and row of a point of the map's frame, whole numbers at the nodes."""
         dx: cython.double = x - self.clearance.x0
         dy: cython.double = y - self.clearance.y0
         return (1 + (self.clearance.cos_yaw * dx + self.clearance.sin_yaw * dy) / self.side,
                 1 + (self.clearance.cos_yaw * dy - self.clearance.sin_yaw * dx) / self.side)
 
     def square_at(self, column, row):
-        """The square that holds a place, or -1 beyond the squares."""
+        """Return the square that holds a place, or -1 beyond the squares."""
         columns: cython.int = self.width - 3
         rows: cython.int = self.size // self.width - 3
         if not (1 <= column <= columns + 1 and 1 <= row <= rows + 1):
@@ -202,7 +203,7 @@ class CostToGoKernel:
         return min(cython.cast(cython.int, row), rows) * self.width + min(cython.cast(cython.int, column), columns)
 
     def within(self, square, along, across):
-        """The cost at a place of a square, as the nodes have it, by its share of the side along the row and across."""
+        """Return the cost within a square, interpolated at shares `along` and `across` of its sides."""
         here: cython.double = self.cost[square]
         right: cython.double = self.cost[square + 1]
         above: cython.double = self.cost[square + self.width]
@@ -219,7 +220,7 @@ class CostToGoKernel:
         return beyond + (1 - along) * (above - beyond) + (1 - across) * (right - beyond)
 
     def fall(self, node, step, across):
-        """By how much the cost falls along an edge from a node to the cheaper neighbour by a step; negative to that before."""
+        """Return the decrease of the cost from a node to its cheaper neighbour `step` before or behind; negative if before."""
         ahead: cython.double = FAR
         behind: cython.double = FAR
         if self.free[node] or self.free[node - across]:

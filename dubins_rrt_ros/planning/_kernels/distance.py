@@ -1,15 +1,16 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The exact distances from the cells of a grid to the nearest blocked one, in two passes; all cells outside it are blocked.
+"""The exact Euclidean distance transform of a grid, in two passes; all cells outside the grid are blocked.
 
-The first goes along the rows: how far away is the next blocked cell in the same row, its `gap`? The second goes along the
-columns. Seen from row r, the nearest blocked cell in row i is (r - i)^2 + gap(i)^2 away, squared: a parabola over r for each i,
-and the squared distances are the lower envelope of them all. They are integers, and so are not rounded.
+The first pass goes along the rows and finds each cell's gap to the next blocked cell in its row. The second goes along the
+columns. Seen from row r, the nearest blocked cell in row i has the squared distance (r - i)^2 + gap(i)^2: a parabola over r for
+each i. The squared distances are the lower envelope of these (P. Felzenszwalb and D. Huttenlocher, Distance transforms of
+sampled functions, 2012), computed in integers, without rounding.
 """
 
 import cython
 import numpy as np
 
-#: So many columns are worked on together, since what lies side by side in memory is fetched together.
+#: Number of columns that are processed together, for the sake of the cache.
 TOGETHER = cython.declare(cython.int, 64)
 
 
@@ -18,8 +19,8 @@ def measure_row_gaps(free: cython.uchar[:, ::1], row_gap: cython.int[:, ::1]):
 
     Args:
         free: (rows, columns) uint8, 1 for each cell that is free, 0 for each that is blocked.
-        aside: (rows, columns) int32, filled: four times how many cells away the nearer one is, and 1 more where the left one is
-            farther, 2 more where the right one is.
+        row_gap: (rows, columns) int32, filled: four times the distance to the nearer of both in cells, plus 1 where the left one
+            is farther, plus 2 where the right one is.
     """
     row: cython.Py_ssize_t
     column: cython.Py_ssize_t
@@ -41,11 +42,11 @@ def measure_row_gaps(free: cython.uchar[:, ::1], row_gap: cython.int[:, ::1]):
 
 def fill_columns(row_gap: cython.int[:, ::1], first: cython.int, last: cython.int, of_squared: cython.float[::1],
                  out: cython.float[:, ::1]):
-    """Write a function of the squared distance to the columns from `first` up to `last`, without that.
+    """Write a function of the squared distance to the columns `first:last`.
 
     Args:
-        aside: (rows, columns) int32, what `measure_row_gaps` finds.
-        of_squared: float32, its value for each squared distance, up to that of a cell in the middle to the outside.
+        row_gap: (rows, columns) int32, as `measure_row_gaps` fills it.
+        of_squared: float32, the function's value for each squared distance that can occur in the grid.
         out: (rows, columns) float32.
     """
     rows: cython.int = cython.cast(cython.int, row_gap.shape[0])
@@ -75,8 +76,8 @@ def fill_columns(row_gap: cython.int[:, ::1], first: cython.int, last: cython.in
 def envelope(column, apex, height, begin):
     """Replace the gaps of a column's cells by the squared distances.
 
-    The column has one cell outside the grid at either end. The other arrays are for the parabolas of the envelope: the row and
-    the height of the lowest point, and the first row in which it is the lowest of all so far.
+    The column has one more cell, outside the grid, at either end. The other arrays are working memory for the parabolas of the
+    envelope: the row and the height of their lowest points, and the first row in which each is the lowest so far.
     """
     last: cython.int = cython.cast(cython.int, column.shape[0]) - 1
     top: cython.int = 0
@@ -90,13 +91,13 @@ def envelope(column, apex, height, begin):
     for row in range(1, last + 1):
         new = cython.cast(cython.longlong, column[row])
         new *= new
-        while True:  # until one is met that is not above the new one all along; the first never is
+        while True:  # remove the parabolas that lie above the new one; the first never does
             away, new_away = begin[top] - apex[top], begin[top] - row
             if away * away + height[top] <= new_away * new_away + new:
                 break
             top -= 1
         away = row - apex[top]
-        # As doubles, which divide faster: they hold these integers, and no quotient below an integer is rounded up to it.
+        # In doubles, which divide faster: they hold these integers exactly, and round no quotient up to an integer.
         crossing = cython.cast(cython.longlong, cython.cast(cython.double, (row + apex[top]) * away + new - height[top])
                                / cython.cast(cython.double, 2 * away))
         if crossing + 1 < last:

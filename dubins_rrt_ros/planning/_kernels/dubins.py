@@ -34,19 +34,19 @@ WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
 
 PI = cython.declare(cython.double, 3.141592653589793238462643383280)
 TWO_PI = cython.declare(cython.double, 6.283185307179586476925286766559)
-#: By how much rounding may push a tangent condition that holds exactly out of its domain, in turning radii.
+#: Rounding by which a tangent condition that holds exactly may leave its domain, in turning radii.
 ROUNDING = cython.declare(cython.double, 1e-12)
-#: Turns within this of a full circle are tried as none [rad]: the angles of close poses are ill-conditioned, and ...
+#: Margin below a full circle within which a turn is tried as none [rad]: the angles between close poses are ill-conditioned.
 NEARLY_NONE = cython.declare(cython.double, 1e-6)
-#: ... are taken as none where the end then is off by no more than this, in turning radii per turning radius of distance.
+#: Error of the end up to which such a turn is taken as none, in turning radii per turning radius of distance.
 FIT = cython.declare(cython.double, 2e-13)
-#: What a coordinate may be off by, relatively: a few roundings, as a pose that was driven to has behind it.
+#: Relative error of a coordinate: a few roundings, such as a pose at the end of a curve has accumulated.
 COORDINATE_ERROR = cython.declare(cython.double, 1e-15)
-#: More than the rounding of 2 - 2 cos; it is the difference from 0 that counts for small turns.
+#: Upper bound of the rounding error of 2 - 2 cos, which matters for small turns.
 COSINE_ERROR = cython.declare(cython.double, 1e-14)
-#: A length beyond all others: no limit, or of a curve that does not exist.
+#: Length that stands for infinity: no limit, or the length of a curve that does not exist.
 UNLIMITED = cython.declare(cython.double, 1e300)
-#: No curve is longer, in turning radii; its square is finite.
+#: Upper bound of the length of a curve, in turning radii, whose square is finite.
 LONGEST = cython.declare(cython.double, 1e150)
 
 
@@ -55,7 +55,7 @@ LONGEST = cython.declare(cython.double, 1e150)
 @cython.inline
 @cython.exceptval(check=False)
 def mod_two_pi(angle: cython.double) -> cython.double:
-    """`angle` in [0, 2 pi)."""
+    """Return the angle wrapped to [0, 2 pi)."""
     if not -TWO_PI <= angle < 2 * TWO_PI:
         angle = fmod(angle, TWO_PI)
     if angle < 0:
@@ -64,7 +64,7 @@ def mod_two_pi(angle: cython.double) -> cython.double:
 
 
 def turn_of(word, arc):
-    """+1 where the arc of the word turns left, -1 right, 0 straight on."""
+    """Return +1 where the arc of the word turns left, -1 right, 0 straight on."""
     first: cython.int = 1 if word == 0 or word == 2 or word == 5 else -1
     if arc == 0:
         return first
@@ -111,7 +111,7 @@ def drive(pose, radius, turn, s):
 
 
 def drive_from(pose, sin_theta, cos_theta, radius, turn, s):
-    """`drive` from a pose whose sine and cosine are known."""
+    """Return what `drive` does, given the sine and cosine of the heading."""
     if turn == 0:
         return Pose(pose.x + s * cos_theta, pose.y + s * sin_theta, pose.theta)
     after: cython.double = pose.theta + turn * s / radius
@@ -144,7 +144,7 @@ def along(pose, radius, curve, s):
 @cython.exceptval(check=False)
 def fits(word: cython.int, t: cython.double, p: cython.double, q: cython.double, x: cython.double, y: cython.double,
          theta0: cython.double, theta1: cython.double, rounding: cython.double) -> cython.bint:
-    """Whether a curve that is driven from (0, 0, theta0) ends at (x, y, theta1), where x and y are rounded by so much."""
+    """Return whether a curve driven from (0, 0, theta0) ends at (x, y, theta1), where x and y have an error of `rounding`."""
     end: Pose = along(Pose(0, 0, theta0), 1, Curve(word, t, p, q), t + p + q)
     tolerance: cython.double = FIT * (1 + fabs(x) + fabs(y))
     return (fabs(end.x - x) <= tolerance + rounding and fabs(end.y - y) <= tolerance + rounding
@@ -157,9 +157,9 @@ def fits(word: cython.int, t: cython.double, p: cython.double, q: cython.double,
 def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q: cython.double, x: cython.double,
                          y: cython.double, theta0: cython.double, theta1: cython.double, rounding: cython.double
                          ) -> tuple[cython.double, cython.double, cython.double]:
-    """The curve with first and last turns that are 2 pi but for rounding taken as none, if the end still fits.
+    """Return the curve without a first or last turn that is 2 pi but for rounding, if its end still fits.
 
-    What a turn falls short of 2 pi by is handed to the other one.
+    What a dropped turn lacks to 2 pi is added to the other turn.
     """
     handed: cython.int = turn_of(word, 0) * turn_of(word, 2)
     less_t: cython.double = 0 if t > TWO_PI - NEARLY_NONE else t
@@ -180,7 +180,7 @@ def without_full_circles(word: cython.int, t: cython.double, p: cython.double, q
 @cython.inline
 @cython.exceptval(check=False)
 def turn_at_least(cos_turn: cython.double, sin_turn: cython.double) -> cython.double:
-    """A lower bound of a turn in [0, 2 pi): its chord, which is at most the turn and at least 2 / pi of a turn up to pi."""
+    """Return a lower bound of a turn in [0, 2 pi): its chord, which is at most the turn, and at least 2 / pi of it up to pi."""
     chord: cython.double = sqrt(max(2 - 2 * cos_turn - COSINE_ERROR, 0.0))
     return chord if sin_turn > -2 * NEARLY_NONE else TWO_PI - PI / 2 * (chord + NEARLY_NONE)
 
@@ -192,7 +192,7 @@ def turn_at_least(cos_turn: cython.double, sin_turn: cython.double) -> cython.do
 def straight_turns_at_least(first: cython.int, last: cython.int, cos_straight: cython.double, sin_straight: cython.double,
                             sin0: cython.double, cos0: cython.double, sin1: cython.double,
                             cos1: cython.double) -> cython.double:
-    """A lower bound of the two turns into and out of a straight arc of known direction."""
+    """Return a lower bound of the two turns into and out of a straight arc of known direction."""
     return (turn_at_least(cos_straight * cos0 + sin_straight * sin0, first * (sin_straight * cos0 - cos_straight * sin0))
             + turn_at_least(cos_straight * cos1 + sin_straight * sin1, last * (cos_straight * sin1 - sin_straight * cos1)))
 
@@ -204,10 +204,11 @@ def straight_turns_at_least(first: cython.int, last: cython.int, cos_straight: c
 def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.double, sin0: cython.double, cos0: cython.double,
          theta1: cython.double, sin1: cython.double, cos1: cython.double, left: cython.double,
          rounding: cython.double, limit: cython.double) -> tuple[cython.double, cython.double, cython.double]:
-    """(t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1), or p = UNLIMITED: none, or none shorter than `limit`.
+    """Return (t, p, q) of a word's curve from (0, 0, theta0) to (x, y, theta1).
 
-    x and y are rounded by no more than `rounding`. `left` is theta1 - theta0 in [0, 2 pi). It, (u, v), and the direction of the
-    straight arc tell most words to be too long before an arctangent is taken.
+    p is UNLIMITED where there is no such curve, or none shorter than `limit`. x and y have an error of at most `rounding`; `left`
+    is theta1 - theta0 in [0, 2 pi). Lower bounds from `left`, (u, v) and the direction of the straight arc rule out most words
+    before an arctangent is computed.
     """
     s: cython.int = turn_of(word, 0)
     last: cython.int = turn_of(word, 2)
@@ -257,15 +258,15 @@ def arcs(word: cython.int, x: cython.double, y: cython.double, theta0: cython.do
 
 
 def rounding_at(x, y):
-    """Return by how much the rounding of poses around (x, y) may move what lies between them [m]."""
+    """Return the largest error of the difference between two coordinates near (x, y) [m]."""
     return COORDINATE_ERROR * max(fabs(x), fabs(y))
 
 
 def shortest_within(dx, dy, theta0, sin0, cos0, theta1, sin1, cos1, radius, rounding, limit):
     """Return the shortest curve to a goal that lies (dx, dy) from the start; lengths in metres.
 
-    dx and dy, in metres too, are rounded by no more than `rounding`. The first arc is UNLIMITED where that curve is not shorter
-    than `limit`, which is found out in a fraction of the time.
+    dx and dy have an error of at most `rounding`, in metres too. The first arc is UNLIMITED where no curve is shorter than
+    `limit`, which takes a fraction of the time.
     """
     x: cython.double = dx / radius
     y: cython.double = dy / radius
@@ -309,18 +310,20 @@ def shortest_curve(start, goal, radius: cython.double):
     return curve.word, curve.first, curve.second, curve.third
 
 
-def all_curves(x0: cython.double, y0: cython.double, theta0: cython.double, x1: cython.double, y1: cython.double,
-               theta1: cython.double, radius: cython.double) -> list:
-    """(word, first, second, third) of every word that has a curve; lengths in metres."""
+def all_curves(start, goal, radius: cython.double) -> list:
+    """Return (word, first, second, third) of every word that has a curve between (x, y, theta) and another; lengths in metres."""
+    begin: Pose = Pose(start[0], start[1], start[2])
+    end: Pose = Pose(goal[0], goal[1], goal[2])
+    rounding: cython.double = max(rounding_at(begin.x, begin.y), rounding_at(end.x, end.y))
     t: cython.double
     p: cython.double
     q: cython.double
     word: cython.int
     found = []
     for word in range(6):
-        t, p, q = arcs(word, (x1 - x0) / radius, (y1 - y0) / radius, theta0, sin(theta0), cos(theta0),
-                       theta1, sin(theta1), cos(theta1), mod_two_pi(theta1 - theta0),
-                       max(rounding_at(x0, y0), rounding_at(x1, y1)) / radius, UNLIMITED)
+        t, p, q = arcs(word, (end.x - begin.x) / radius, (end.y - begin.y) / radius, begin.theta, sin(begin.theta),
+                       cos(begin.theta), end.theta, sin(end.theta), cos(end.theta), mod_two_pi(end.theta - begin.theta),
+                       rounding / radius, UNLIMITED)
         if p < UNLIMITED:
             found.append((word, t * radius, p * radius, q * radius))
     return found

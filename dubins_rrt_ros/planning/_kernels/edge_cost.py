@@ -1,8 +1,8 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""What an edge costs: its length. The one place to change for another objective.
+"""The cost of an edge: its length. The one place in the kernels to change for another objective.
 
-Every search minimises the sum of the costs of a path's edges. What it prunes by needs the cost to be at least the length: then a
-Dubins length, a straight line and the way around the obstacles stay lower bounds.
+Every search minimises the sum of the costs of a path's edges. Pruning requires that an edge cost at least its length: only then
+are the Dubins length, the straight line and the way around the obstacles lower bounds of the cost.
 """
 
 import cython

@@ -1,15 +1,15 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The distance from a source around obstacles, on a lattice of squares: the equation |grad cost| = 1, nowhere exceeded.
+"""The eikonal equation |grad cost| = 1 on a grid of squares: distances from a source around obstacles, nowhere too steep.
 
-Every free square is split into two triangles, along the diagonal that makes the steeper one less steep; the cost is linear on
-both. Its gradient is at most 1 on each, and nearly so on almost all.
+Each free square is split into two triangles, along the diagonal that makes the steeper one less steep; the cost is linear on
+each. Its gradient is at most 1 on every triangle, and close to 1 on almost all. Three stages compute it:
 
-At first the equation is solved by upwind differences of first order, about in the order of the costs as in fast marching; or, as
-in A*, in the order of the costs and the straight way on to a target, and only as far as asked. Where ways fan out, around the
-source and around corners, that is too steep. So it is solved again with a gradient as much below 1 there as it came out above,
-node by node in the order noted; a node that overtakes an earlier one passes its cost on once more. What is still too steep then,
-a few triangles by little, is cured by height: all costs between two levels are pressed together by the greatest gradient between
-these.
+1. First-order upwind differences, roughly in the order of the costs, as fast marching does; or, given a target, in the order of
+   the cost plus the straight line to the target, as A* does, and only as far as asked.
+2. Around the source and around corners, where paths fan out, that is too steep. The equation is solved again, node by node in the
+   order noted, with a gradient reduced by the factor that it had exceeded 1 by; a node whose cost falls passes it on once more.
+3. The few triangles that are still slightly too steep are flattened by height: all costs between two levels are scaled down by
+   the greatest gradient between these levels.
 """
 
 import cython
@@ -20,22 +20,22 @@ if cython.compiled:
 else:
     from math import floor, hypot, sqrt
 
-#: The cost of what is not reached.
+#: Cost of a node that is not reached.
 FAR = cython.declare(cython.double, 1e300)
-#: A smaller fall of a cost is not passed on [squares]. On the way to a target more is let pass, since there a node often has its
-#: turn before both neighbours that its cost depends on, and falls by little, again and again, as others do behind it.
+#: Least decrease of a cost that is passed on [squares]. It is greater with a target: in A* order a node is often processed before
+#: both of its upwind neighbours, and would be queued again and again for tiny decreases.
 LEAST_FALL = cython.declare(cython.double, 1e-4)
 LEAST_FALL_WITH_TARGET = cython.declare(cython.double, 0.1)
-#: By how much the limit is raised at a time, without a target and with one [squares].
+#: Step by which the limit is raised, without a target and with one [squares].
 RISE = cython.declare(cython.double, 1)
 RISE_WITH_TARGET = cython.declare(cython.double, 4)
-#: How often the equation is solved again.
+#: Number of times that the equation is solved again.
 REPEATS = cython.declare(cython.int, 3)
-#: So many levels of the cost make a side of a square.
+#: Number of cost levels per side of a square.
 LEVELS = cython.declare(cython.double, 4)
-#: The cosine of pi / 8: so much flatter than a cone, the triangles around its tip are not too steep.
+#: Slope of the costs around the source, the cosine of pi / 8: triangles at the tip of such a cone are not too steep.
 FLATTER = cython.declare(cython.double, 0.9238795325112867)
-#: Where a node is: in no queue, in the queue, or among those whose turn comes later.
+#: States of a node: in no queue, in the queue, or postponed until the limit is raised.
 IDLE = cython.declare(cython.schar, 0)
 QUEUED = cython.declare(cython.schar, 1)
 POSTPONED = cython.declare(cython.schar, 2)
@@ -43,14 +43,14 @@ POSTPONED = cython.declare(cython.schar, 2)
 
 @cython.cclass
 class Eikonal:
-    """The costs of nodes, in sides of a square.
+    """The costs of the nodes, in sides of a square.
 
-    Square `row * width + column` has the nodes of this number, of the next, and of those a row on. A border of squares is not
-    free: the first row and column and the last two.
+    Square s = row * width + column has the nodes s, s + 1, s + width and s + width + 1. The squares of the first row and column
+    and of the last two are never free.
     """
 
     def __init__(self, free):
-        """`free` is (rows, columns) int8, not 0 for each free square; `columns` is the width."""
+        """Take (rows, columns) int8, not 0 for each free square; `columns` is the width."""
         self.width, self.size = free.shape[1], free.size
         self.free = free.reshape(-1)
         self.cost = np.full(free.size, FAR)
@@ -63,27 +63,29 @@ class Eikonal:
         self.has_target, self.target_column, self.target_row = False, 0, 0
 
     def begin(self, column: cython.double, row: cython.double, reach: cython.double):
-        """Seek the costs from all within `reach` of a place on; the nodes around it get no more than their distances to that.
-        Here and there they come out too steep."""
+        """Start from all points within `reach` of a place, in sides of a square.
+
+        The nodes around it get at most their distances to it. The costs can come out too steep; see `flatten`.
+        """
         with cython.nogil:
             self.limit = 1 + self.straight_on(cython.cast(cython.int, row) * self.width + cython.cast(cython.int, column))
             self.seed(column, row, reach)
 
     def aim(self, column: cython.double, row: cython.double):
-        """Before `begin`: find the costs on the way to a place first, some hundredths too high."""
+        """Find the costs towards a place first, some hundredths too high. To be called before `begin`."""
         self.has_target, self.target_column, self.target_row = True, column, row
         self.least_fall, self.rise = LEAST_FALL_WITH_TARGET, RISE_WITH_TARGET
 
     def finish(self):
         """Find the costs of all nodes."""
         with cython.nogil:
-            if self.has_target:  # from here on the order of the costs is quicker
+            if self.has_target:  # from now on the order of the costs is faster
                 self.has_target, self.limit, self.least_fall, self.rise = False, 0, LEAST_FALL, RISE
             self.until = FAR
             self.flood()
 
     def flatten(self):
-        """Make the costs lower where they are too steep, once; there must have been no target."""
+        """Lower the costs where they are too steep. To be called once, and only without a target."""
         self.finish()
         self.gradient, self.slope, self.has_gradients = np.ones(self.size), np.zeros(self.size), True
         _: cython.int
@@ -99,7 +101,7 @@ class Eikonal:
             self.compress(steepest, heights)
 
     def seed(self, column, row, reach):
-        """Begin at the nodes of all free squares that are within reach of a place."""
+        """Queue the nodes of all free squares within `reach` of a place."""
         columns: cython.double = self.width - 3
         rows: cython.double = self.size // self.width - 3
         left: cython.int = cython.cast(cython.int, min(max(1.0, floor(column - reach)), columns))
@@ -121,7 +123,7 @@ class Eikonal:
                     self.relax(node, FLATTER * max(0.0, hypot(j + (corner & 1) - column, i + (corner >> 1) - row) - reach))
 
     def straight_on(self, node):
-        """How far a node is from the target, if there is one."""
+        """Return the distance from a node to the target, 0 without one."""
         if not self.has_target:
             return 0
         columns: cython.double = node % self.width - self.target_column
@@ -129,12 +131,12 @@ class Eikonal:
         return sqrt(columns * columns + rows * rows)
 
     def ensure_final(self, square):
-        """Make sure that the nodes of a free square have their costs, if they can be reached."""
+        """Compute the costs of the nodes of a free square, unless they are known or cannot be reached."""
         if self.waiting + self.postponed > 0 and not self.is_final(square):
             self.flood_up_to(square)
 
     def flood_up_to(self, square):
-        """Raise the limit until the nodes of a square have had their turns, and once more, since others may count for them."""
+        """Raise the limit until the nodes of a square were processed, and once more for later ones that lower their costs."""
         while self.waiting + self.postponed > 0 and not self.is_final(square):
             self.until = self.limit + self.rise
             self.flood()
@@ -142,13 +144,15 @@ class Eikonal:
         self.flood()
 
     def is_final(self, square):
-        """Whether all nodes of a square have had their turns."""
+        """Return whether all nodes of a square were processed."""
         return max(max(self.rank[square], self.rank[square + 1]),
                    max(self.rank[square + self.width], self.rank[square + self.width + 1])) < self.size
 
     def flood(self):
-        """Let costs pass from node to node until none below the limit falls, and note in which order the nodes had their turns;
-        raise the limit as far as `until`."""
+        """Pass costs from node to node until none falls, raising the limit up to `until`.
+
+        `order` lists the nodes as they were processed for the first time.
+        """
         node: cython.int
         while self.waiting + self.postponed > 0:
             if self.waiting == 0:
@@ -171,12 +175,12 @@ class Eikonal:
                 self.pass_on(node, node - self.width)
 
     def pass_on(self, node, neighbour):
-        """Let the cost of a node count for a neighbour that costs more."""
+        """Update a neighbour that costs more than a node."""
         if self.falls_behind(neighbour, node):
             self.relax(neighbour, self.update(neighbour, self.gradient[neighbour] if self.has_gradients else 1))
 
     def relax(self, node, cost):
-        """Let a node have a cost that is lower than its own, and wait to pass it on: at once only where it is below the limit."""
+        """Lower the cost of a node, if this one is lower, and queue it below the limit or postpone it above."""
         if cost >= self.cost[node] - self.least_fall:
             return
         self.cost[node] = cost
@@ -188,7 +192,7 @@ class Eikonal:
             self.postponed += 1
 
     def raise_limit(self):
-        """Raise the limit, and queue what is below it now."""
+        """Raise the limit, and queue the postponed nodes that are below it now."""
         count: cython.int = self.postponed
         node: cython.int
         i: cython.int
@@ -196,7 +200,7 @@ class Eikonal:
         self.postponed = 0
         for i in range(count):
             node = self.later[i]
-            if self.state[node] != POSTPONED:  # it was queued meanwhile
+            if self.state[node] != POSTPONED:  # queued since
                 continue
             if self.cost[node] + self.straight_on(node) < self.limit:
                 self.enqueue(node)
@@ -205,7 +209,7 @@ class Eikonal:
                 self.postponed += 1
 
     def enqueue(self, item):
-        """Put a node or a square behind all in the queue, unless it is there."""
+        """Append a node to the queue, unless it is there."""
         if self.state[item] == QUEUED:
             return
         self.state[item] = QUEUED
@@ -214,7 +218,7 @@ class Eikonal:
         self.waiting += 1
 
     def dequeue(self):
-        """Take the first node or square from the queue."""
+        """Remove the first node from the queue and return it."""
         item: cython.int = self.queue[self.first]
         self.state[item] = IDLE
         self.first = self.first + 1 if self.first + 1 < self.size else 0
@@ -222,7 +226,7 @@ class Eikonal:
         return item
 
     def update(self, node, gradient):
-        """The cost of a node by its neighbours: the least over the free squares around it."""
+        """Return the cost of a node by its neighbours: the least over the free squares around it."""
         before: cython.double = self.cost[node - 1]
         behind: cython.double = self.cost[node + 1]
         below: cython.double = self.cost[node - self.width]
@@ -241,7 +245,7 @@ class Eikonal:
         return least
 
     def reduce_slopes(self):
-        """Solve again, node by node in order, with a gradient that makes up for the steepest square around each."""
+        """Solve again, node by node in order, each with a gradient reduced by the steepest square around it."""
         square: cython.int
         node: cython.int
         i: cython.int
@@ -260,11 +264,11 @@ class Eikonal:
                 self.flood()
 
     def falls_behind(self, neighbour, node):
-        """Whether a neighbour that had its turn costs more than a node, so that it may be reached from there."""
+        """Return whether a neighbour that was processed costs more than a node, so that it may be reached from there."""
         return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + self.least_fall
 
     def find_steepest(self, steepest):
-        """Find the greatest gradient, and at least 1, of the squares that have each level of the cost."""
+        """Find, for each level of the cost, the greatest gradient of the squares that reach it, and at least 1."""
         square: cython.int
         level: cython.int
         slope: cython.double
@@ -284,7 +288,7 @@ class Eikonal:
                 steepest[level] = max(steepest[level], slope)
 
     def compress(self, steepest, heights):
-        """Make every level so much lower that no gradient is above 1; `heights` has room for where they begin."""
+        """Scale each level down so that no gradient exceeds 1; `heights` is working memory: the costs where levels begin."""
         level: cython.int
         node: cython.int
         heights[0] = 0
@@ -296,7 +300,7 @@ class Eikonal:
                 self.cost[node] = heights[level] + (self.cost[node] - level / LEVELS) / steepest[level]
 
     def steepest(self, square):
-        """The greater gradient of a square's triangles, or 1 where it is less."""
+        """Return the greater gradient of a square's triangles, at least 1."""
         upwards: cython.double
         across: cython.double
         upwards, across = squared_slopes(self.cost[square], self.cost[square + 1], self.cost[square + self.width],
@@ -305,7 +309,7 @@ class Eikonal:
 
 
 def squared_slopes(here, right, above, beyond):
-    """The squares of the greater gradients of a square's triangles, if it is split from `here` to `beyond`, and if across."""
+    """Return the squared greater gradient of a square's triangles, by the diagonal from `here` to `beyond` and by the other."""
     bottom: cython.double = (right - here) * (right - here)
     top: cython.double = (beyond - above) * (beyond - above)
     left: cython.double = (above - here) * (above - here)
@@ -318,7 +322,7 @@ def squared_slopes(here, right, above, beyond):
 @cython.inline
 @cython.exceptval(check=False)
 def upwind(one: cython.double, other: cython.double, gradient: cython.double) -> cython.double:
-    """What a node costs by its neighbours along the row and across, a square away each."""
+    """Return the cost of a node by one neighbour in its row and one in its column, each a square away."""
     apart: cython.double = one - other
     if apart >= gradient:
         return other + gradient

@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""A binary heap of numbered items: the one with the least key is on top."""
+"""A binary heap of numbered items with the least key on top."""
 
 import cython
 import numpy as np
@@ -22,7 +22,7 @@ class Heap:
             self.items, self.keys = resized(self.items, capacity), resized(self.keys, capacity)
 
     def least_key(self):
-        """The key of the item on top; the heap must not be empty."""
+        """Return the key of the item on top; the heap must not be empty."""
         return self.keys[0]
 
     def push(self, item, key):

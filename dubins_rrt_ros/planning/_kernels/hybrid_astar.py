@@ -1,13 +1,14 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Hybrid A*: a search over short arcs that keeps one pose per cell of a grid of positions and headings, its closed set.
+"""Hybrid A*: a search over short arcs that keeps one pose for each cell of position and heading, its closed set.
 
 D. Dolgov, S. Thrun, M. Montemerlo and J. Diebel, Practical search techniques in path planning for autonomous driving (2008).
-The next pose is the one whose cost and weighted cost-to-go together are least; the cost-to-go is the longer one of the way around
-the obstacles and of the Dubins curve without them. From each pose the Dubins curve to the goal is tried, unless it is so much
-shorter than the way around the obstacles that it must hit one.
+The pose with the least sum of cost and weighted cost-to-go is expanded next. The cost-to-go is the greater of two lower bounds:
+the way around the obstacles for a disc that turns on the spot, and the Dubins curve without obstacles. From each pose the Dubins
+curve to the goal is tried, unless it is so much shorter than the way around the obstacles that it must hit one.
 
-The cost-to-go can lead into a passage that the vehicle cannot turn into. Before another way is tried, all poses in front of it
-would be expanded, with every heading. So a pose may count for more the more of them were expanded around it.
+The cost-to-go can lead into a passage that the vehicle cannot turn into. The search would then expand all poses in front of it,
+with every heading, before it tries another way. A visit penalty therefore raises the key of a pose with each pose that was
+expanded nearby.
 """
 
 import cython
@@ -44,36 +45,40 @@ else:
 
 #: Cost in the closed set of a cell whose pose was expanded.
 EXPANDED = cython.declare(cython.float, -1)
-#: Share of the way around the obstacles below which a curve to the goal is not tried; that way can come out too long by some
-#: hundredths.
+#: Share of the way around the obstacles below which a curve to the goal is not tried. It is below 1 since the computed way can be
+#: some hundredths too long.
 LEAST_SHARE = cython.declare(cython.double, 0.95)
-#: Maximum number of poses that an expansion reaches.
+#: Number of arcs from a pose: straight on, left and right.
 TURNS = cython.declare(cython.int, 3)
 
 
 @cython.cclass
 class HybridAStar:
-    """A search under way.
+    """A search, which `run` takes further a portion at a time.
 
     Attributes:
-        size: number of poses reached; expanded: number of them that were expanded.
+        size: number of poses reached.
+        expanded: number of poses expanded.
         ended: whether a path was found, or nothing is left to expand.
     """
 
     def __init__(self, checker: CollisionChecker, radius, start, goals, to_goal: CostToGoKernel, corner, extent, arc, sectors,
                  weight, visit_penalty, limit, max_expanded):
-        """
+        """Start a search.
+
         Args:
-            checker: judges all arcs.
+            checker: judges every arc.
             radius: the turning radius [m].
-            start: (x, y, theta); goals: (m, 3) poses any of which will do.
+            start: (x, y, theta).
+            goals: (m, 3) poses, any of which will do.
             to_goal: the cost-to-go around obstacles.
             corner, extent: lowest (x, y) of the map, and its size [m].
-            arc: the length of an arc [m]; the closed set has cells of 0.7 of that, and `sectors` headings.
-            weight: of the cost-to-go: 1 seeks the shortest path, more a quick one.
-            visit_penalty: by how many arcs' costs a pose counts for more for each that was expanded in its block of four cells.
-            limit: paths that do not cost less are not sought [m].
-            max_expanded: the search ends when this many poses were expanded.
+            arc: length of an arc [m]; the cells of the closed set have sides of 0.7 of that.
+            sectors: number of headings that the closed set tells apart.
+            weight: factor of the cost-to-go: 1 seeks the shortest path; greater values find one sooner.
+            visit_penalty: added to a pose's key for each pose expanded in its block of four cells [lengths of arcs].
+            limit: cost that paths must be below [m].
+            max_expanded: maximum number of poses to expand.
         """
         self.checker, self.radius = checker, radius
         self.to_goal, self.goals = to_goal, goals
@@ -81,7 +86,7 @@ class HybridAStar:
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
         self.arc, self.weight, self.visit_penalty, self.limit, self.max_expanded = arc, weight, visit_penalty, limit, max_expanded
         self.closed_set = ClosedSet(corner, extent, 0.7 * arc, sectors)
-        self.visits_near = ClosedSet(corner, extent, 1.4 * arc, 1)  # whose costs are counts
+        self.visits_near = ClosedSet(corner, extent, 1.4 * arc, 1)  # its costs are counts of expanded poses
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
         self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
         self.open = Heap(0)
@@ -92,7 +97,7 @@ class HybridAStar:
         self.add(Pose(start[0], start[1], start[2]), 0, -1, 0, 0, True)
 
     def run(self, expansions: cython.int):
-        """Expand up to this many poses more, fewer where the search ends."""
+        """Expand up to `expansions` more poses, fewer where the search ends."""
         _: cython.int
         expansions = min(expansions, self.max_expanded - self.expanded)
         self.reserve(TURNS * expansions)
@@ -116,8 +121,12 @@ class HybridAStar:
             self.curve_may_be_free = resized(self.curve_may_be_free, capacity)
 
     def path(self):
-        """Return the path that was found: (n, 3) poses from the start on, and (n,) words and (n, 3) lengths [m] of the curves to
-        them from those before, the first of which mean nothing; None where there is none."""
+        """Return the path that was found, or None.
+
+        Returns:
+            (n, 3) poses from the start to a goal, and (n,) words and (n, 3) lengths [m] of the curves to them from the poses
+            before; the first of these mean nothing.
+        """
         if self.last < 0:
             return None
         nodes = []
@@ -139,7 +148,7 @@ class HybridAStar:
         return Pose(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
 
     def expand(self, node):
-        """Try the curve to the goal, then the three arcs from a pose, unless a better one of its cell was expanded before."""
+        """Try the curve to the goal, then the three arcs from a pose, unless another pose of its cell was expanded."""
         pose: Pose = self.pose_of(node)
         entry: cython.int = self.closed_set.entry_at(pose.x, pose.y, pose.theta)
         if self.closed_set.costs[entry] == EXPANDED:
@@ -158,7 +167,7 @@ class HybridAStar:
         self.extend(node, sine, cosine, -1)
 
     def reaches_goal(self, node):
-        """Return whether a free curve leads to the goal that is nearest by its curve; if so, it is noted."""
+        """Return whether the shortest curve to a goal is free; if so, it is the last one of the path."""
         goal: cython.int
         pose: Pose = self.pose_of(node)
         curve: Curve
@@ -172,8 +181,10 @@ class HybridAStar:
         return self.last_goal >= 0 and self.checker.motion_is_free(pose, self.radius, self.last_curve)
 
     def extend(self, node, sine, cosine, turn):
-        """Drive an arc from a pose, whose heading has that sine and cosine; keep where it ends if that can still lead to the goal
-        and is the best of its cell so far."""
+        """Drive an arc from a pose, given the sine and cosine of its heading.
+
+        Keep the pose at its end, if that is free, the cheapest of its cell so far and may lead to the goal below the limit.
+        """
         pose: Pose = self.pose_of(node)
         curve: Curve = single_arc(turn, self.arc)
         end: Pose = drive_from(pose, sine, cosine, self.radius, turn, self.arc)
@@ -199,7 +210,7 @@ class HybridAStar:
         self.add(end, cost, node, turn, key, curve_may_be_free)
 
     def cost_to_go(self, pose, limit):
-        """Return a lower bound of the cost to the goal, if less than `limit`; and whether the curve to the goal may be free."""
+        """Return a lower bound of the cost to the goal, and whether the curve to it may be free; valid below `limit`."""
         around: cython.double = self.to_goal.at(pose.x, pose.y)
         if around >= limit or self.goals.shape[0] > 1:
             return around, True
@@ -207,13 +218,13 @@ class HybridAStar:
         return max(around, direct), direct >= LEAST_SHARE * around
 
     def curve_to_goal(self, pose, goal, limit):
-        """Return the shortest curve to one of the goals, or none shorter than `limit`."""
+        """Return the shortest curve to a goal; its first arc is UNLIMITED where it is not shorter than `limit`."""
         return shortest_within(self.goals[goal, 0] - pose.x, self.goals[goal, 1] - pose.y, pose.theta, sin(pose.theta),
                                cos(pose.theta), self.goals[goal, 2], self.goal_headings[goal, 0], self.goal_headings[goal, 1],
                                self.radius, self.rounding, limit)
 
     def add(self, pose, cost, parent, turn, key, curve_may_be_free):
-        """Note a pose that was reached, to be expanded."""
+        """Add a pose that was reached to the open set."""
         node: cython.int = self.size
         self.size += 1
         self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = pose.x, pose.y, pose.theta

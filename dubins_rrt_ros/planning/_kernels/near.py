@@ -1,10 +1,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Near sets by Dubins length, which is not symmetric: *near to a pose* and *near from a pose* are two questions.
+"""Near neighbours by Dubins length. It is not symmetric, so the nodes that reach a pose and those reached from it are two sets.
 
-S. Karaman and E. Frazzoli, Sampling-based optimal motion planning for non-holonomic dynamical systems (2013), have both.
-The search is exact: buckets are visited ring by ring, and a ring whose straight-line distance is too long ends it, since no
-Dubins curve is shorter than the straight line, nor than the turn from heading to heading. Of what is nearer, most is ruled out as
-it lies behind or beside the vehicle: there, no curve leads that is shorter than half a circle.
+S. Karaman and E. Frazzoli, Sampling-based optimal motion planning for non-holonomic dynamical systems (2013), define both.
+The search is exact. It visits the tree's buckets in rings around the pose and stops at the first ring farther away than the
+neighbour radius, since no Dubins curve is shorter than the straight line. Nodes within the radius are ruled out by two more lower
+bounds: the turn from heading to heading, and half a circle for all that lies behind or beside the vehicle.
 """
 
 import cython
@@ -21,7 +21,7 @@ else:
     from .tree import SearchTree
 
 
-#: Factor by which the next neighbour radius is guessed to exceed the last one.
+#: Factor from one neighbour radius to the guess of the next.
 RADIUS_GUESS_FACTOR = cython.declare(cython.double, 1.25)
 #: Multiplicative steps of a running 20 % quantile of the neighbour radius.
 RISE = cython.declare(cython.double, 1.1 ** 0.2)
@@ -30,7 +30,7 @@ FALL = cython.declare(cython.double, 1.1 ** 0.8)
 HALF_DIAGONAL = cython.declare(cython.double, 0.7072)
 #: Tolerance above the rounding of a position, in turning radii.
 NEARLY = cython.declare(cython.double, 1e-9)
-#: Least guess of the neighbour radius, in turning radii: it grows by doubling, which must not begin at 0.
+#: Least guess of the neighbour radius, in turning radii; doubling could not get away from 0.
 LEAST_RADIUS_GUESS = cython.declare(cython.double, 1e-3)
 
 
@@ -38,9 +38,14 @@ LEAST_RADIUS_GUESS = cython.declare(cython.double, 1e-3)
 class BackwardNeighbors:
     """The nodes with the shortest curves *to* a pose, shortest first, with these curves.
 
-    The first `count` entries of the arrays are in use: `nodes`, their curves as `words` and `lengths`, and the curves'
-    lengths as `keys`. A node whose curve is not shorter than `neighbor_radius`, which shrinks as nodes are found, is left
-    out; so is one whose curve is not shorter than what its cost leaves of `cost_budget`.
+    Attributes:
+        count: number of neighbours; the first `count` entries of the arrays are in use.
+        nodes: (n,) their numbers in the tree.
+        words, lengths: (n,) and (n, 3): their curves.
+        keys: (n,) the lengths of these [m].
+        neighbor_radius: length that a curve must be below [m]; it shrinks as nodes are found.
+        cost_budget: limit of the cost by way of a node; its curve must be shorter than what its cost leaves of that [m].
+        direction: -1 for curves to the pose, +1 for curves from it.
     """
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
@@ -54,9 +59,9 @@ class BackwardNeighbors:
         self.lengths = np.empty((capacity, 3))
 
     def collect_nearest(self, pose, wanted, max_length):
-        """Find the `wanted` nodes with the shortest curves to a pose, shorter than `max_length` each, as far as there is room.
+        """Find the `wanted` nodes with the shortest curves to a pose, each shorter than `max_length`; at most the capacity.
 
-        A guess of how far they are saves the curves to those beyond; where it was too small, the search starts again.
+        Nodes beyond a guessed radius cost no curve; where the guess was too small, the search starts again with twice as much.
         """
         self.wanted = min(min(wanted, self.tree.indexed), cython.cast(cython.int, self.keys.shape[0]))
         self.begin(pose, min(self.radius_guess, max_length))
@@ -72,10 +77,9 @@ class BackwardNeighbors:
             self.typical_radius = self.typical_radius / FALL
 
     def collect_useful(self, pose, wanted, max_cost, max_length):
-        """Find the `wanted` nodes with the shortest curves to a pose by which it costs less than `max_cost`, within the typical
-        radius.
+        """Find the `wanted` nodes with the shortest curves by which a pose costs less than `max_cost`, within the typical radius.
 
-        Most nodes are too expensive already by the straight line, so that few curves are computed.
+        The straight line alone shows most nodes to be too expensive, so that few curves are computed.
         """
         self.wanted = min(wanted, cython.cast(cython.int, self.keys.shape[0]))
         self.begin(pose, min(self.typical_radius, max_length))
@@ -83,7 +87,7 @@ class BackwardNeighbors:
         self.consider_all()
 
     def begin(self, pose, radius):
-        """Empty the set and set the pose that it is about."""
+        """Empty the set, for a new pose and radius."""
         self.count = 0
         self.neighbor_radius = radius
         self.cost_budget = UNLIMITED
@@ -102,7 +106,7 @@ class BackwardNeighbors:
         self.lengths[i, 0], self.lengths[i, 1], self.lengths[i, 2] = curve.first, curve.second, curve.third
 
     def insert(self, node, curve):
-        """Insert a node by the length of its curve; the longest one drops out when there is no more room."""
+        """Insert a node in the order of the curves' lengths; the last one drops out when the set is full."""
         if self.count < self.wanted:
             self.count += 1
         length: cython.double = length_of(curve)
@@ -120,7 +124,7 @@ class BackwardNeighbors:
             self.neighbor_radius = self.keys[self.count - 1]
 
     def consider(self, node, dx, dy, limit):
-        """Take a node, which lies (dx, dy) from the pose, if its curve to the pose is shorter than `limit`."""
+        """Insert a node, which lies (dx, dy) from the pose, if its curve to the pose is shorter than `limit`."""
         curve: Curve = shortest_within(
             -dx, -dy, self.tree.poses[node, 2], self.tree.headings[node, 0], self.tree.headings[node, 1],
             self.pose.theta, self.sin_theta, self.cos_theta, self.tree.radius, self.tree.rounding, limit)
@@ -128,7 +132,7 @@ class BackwardNeighbors:
             self.insert(node, curve)
 
     def consider_bucket(self, row, column):
-        """Consider the nodes of a bucket that the lower bounds do not rule out; most are ruled out by cost and straight line."""
+        """Consider the nodes of a bucket that the lower bounds do not rule out."""
         node: cython.int = self.tree.buckets[row, column]
         radius: cython.double = self.tree.radius
         half_circle: cython.double = TWO_PI / 2 * radius
@@ -155,7 +159,7 @@ class BackwardNeighbors:
             node = self.tree.next_in_bucket[node]
 
     def consider_all(self):
-        """Consider the nodes bucket by bucket, in rings around the pose, until a ring is out of reach."""
+        """Consider the buckets in rings around the pose, until a ring lies beyond the neighbour radius."""
         row: cython.int = self.tree.bucket_row(self.pose.y)
         column: cython.int = self.tree.bucket_column(self.pose.x)
         rows: cython.int = cython.cast(cython.int, self.tree.buckets.shape[0])
@@ -185,20 +189,20 @@ class BackwardNeighbors:
 
 @cython.cclass
 class ForwardNeighbors(BackwardNeighbors):
-    """The nodes that would be cheaper if they were reached *from* a node, within reach, with the curves to them."""
+    """The nodes that would be cheaper if they were reached *from* a node, within a radius, with the curves to them."""
 
     def __init__(self, tree: SearchTree, capacity: cython.int):
         BackwardNeighbors.__init__(self, tree, capacity)
         self.direction = 1
 
     def collect_cheaper(self, node, radius, least_gain):
-        """Find the nodes that gain more than `least_gain` by a curve shorter than `radius` from `node`."""
+        """Find the nodes whose cost falls by more than `least_gain` with a curve shorter than `radius` from `node`."""
         self.begin(self.tree.pose_of(node), radius)
         self.cost_budget = -(self.tree.costs[node] + least_gain)
         self.consider_all()
 
     def consider(self, node, dx, dy, limit):
-        """Take a node if it gains; where there is no more room, the others have to wait for the next chance."""
+        """Add a node if its cost falls; once the set is full, further nodes are ignored."""
         if self.count >= self.nodes.shape[0]:
             return
         curve: Curve = shortest_within(
@@ -215,7 +219,7 @@ class ForwardNeighbors(BackwardNeighbors):
 @cython.inline
 @cython.exceptval(check=False)
 def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
-    """Return the angle between two headings, or 0 where they are too far from [-pi, pi] to tell without a division."""
+    """Return the angle between two headings; 0, a lower bound, where they are too far from [-pi, pi] to save a division."""
     angle: cython.double = fabs(theta1 - theta0)
     if angle > TWO_PI / 2:
         angle = fabs(TWO_PI - angle)
@@ -228,10 +232,10 @@ def turned(theta0: cython.double, theta1: cython.double) -> cython.double:
 @cython.exceptval(check=False)
 def takes_half_circle(x: cython.double, y: cython.double, sine: cython.double, cosine: cython.double, radius: cython.double,
                       slack: cython.double) -> cython.bint:
-    """Return whether no curve shorter than half a circle leads to (x, y), nor to anything within `slack` of it.
+    """Return whether no curve shorter than half a circle leads to (x, y), nor to any point within `slack` of it.
 
-    By the heading at its start, or that at its end: such a curve neither gets behind itself nor into the circles that it could
-    turn on there.
+    Such a curve reaches neither the half plane behind its first pose nor the inside of its two turning circles there. `sine` and
+    `cosine` are of the heading at the start; by symmetry, those at the end serve as well.
     """
     along: cython.double = x * cosine + y * sine
     across: cython.double = fabs(y * cosine - x * sine) - slack

@@ -1,8 +1,8 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
 """The inner loops of Algorithm 1 (RRT) and Algorithm 2 (RRT*) of A. Khanal, RRT and RRT* Using Vehicle Dynamics.
 
-Algorithm 2 is completed by the half that it leaves out and S. Karaman and E. Frazzoli, Sampling-based algorithms for optimal
-motion planning (2011), have: the parent of a new node is chosen among its near nodes too, not only theirs rewired.
+Algorithm 2 there only rewires the near nodes of a new one. Here its parent is chosen among them too, as in S. Karaman and
+E. Frazzoli, Sampling-based algorithms for optimal motion planning (2011).
 """
 
 import cython
@@ -37,26 +37,27 @@ else:
     from .near import BackwardNeighbors, ForwardNeighbors
     from .tree import SearchTree
 
-#: Least gain that is reason to rewire [m]; a smaller one is rounding.
+#: Least gain for which a node is rewired [m]; a smaller one is rounding.
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
-#: Where there is a cost bound, one sample of this many is taken through RRT* in full, which is enough for asymptotic optimality.
-#: All others search only nodes within the typical radius whose cost could still improve the solution, which is much faster.
+#: Number of samples, where there is a cost bound, of which one goes through RRT* in full: enough for asymptotic optimality.
+#: All others search only the nodes within the typical radius whose cost could still improve the solution, which is much faster.
 SAMPLES_PER_FULL = cython.declare(cython.int, 64)
-#: Relative rounding of the sum of a step's arcs.
+#: Relative rounding error of the sum of a step's arcs.
 ROUNDING = cython.declare(cython.double, 1e-9)
 
 
 @cython.cclass
 class RrtKernel:
-    """Adds samples to a tree.
+    """RRT and RRT* over blocks of samples, which are added to a tree.
 
     Attributes:
-        goal_nodes: the nodes that reach the goal are its first `goal_count`.
+        goal_nodes: the nodes that reach the goal: its first `goal_count` entries.
     """
 
     def __init__(self, tree: SearchTree, checker: CollisionChecker, step, near_factor, max_near, goal, tolerance_xy,
                  tolerance_yaw):
-        """
+        """Search with a tree, and without a cost bound at first.
+
         Args:
             checker: judges every edge.
             step: maximum length of a new edge [m]; 0 is unlimited.
@@ -78,10 +79,10 @@ class RrtKernel:
         self.cost_bound = UNLIMITED
 
     def set_cost_bound(self, cost_bound: cython.double, from_start: CostToGoKernel, to_goal: CostToGoKernel):
-        """From now on add and attach only what can be on a path that costs less than `cost_bound` [m].
+        """Add and rewire from now on only nodes that can be on a path that costs less than `cost_bound` [m].
 
         Args:
-            from_start, to_goal: lower bounds of the costs from the start and to the goal.
+            from_start, to_goal: lower bounds of the costs from the start and to the goal, around the obstacles.
         """
         self.bounded = True
         self.cost_bound, self.from_start, self.to_goal = cost_bound, from_start, to_goal
@@ -99,7 +100,7 @@ class RrtKernel:
         i: cython.int
         pose: Pose
         curve: Curve
-        has_others: cython.bint = self.tree.size > 1  # those on the path itself gain nothing
+        has_others: cython.bint = self.tree.size > 1  # nodes of the path itself gain nothing
         self.reserve(last)
         with cython.nogil:
             for i in range(1, last + 1):
@@ -148,7 +149,7 @@ class RrtKernel:
         return i
 
     def extend(self, sample):
-        """Run one round of Algorithm 1: find the closest node, steer towards the sample, add unless it collides."""
+        """Run one round of Algorithm 1: find the closest node, steer towards the sample, add the new pose if the edge is free."""
         if self.step == 0 and not self.checker.pose_is_free(sample):
             return
         if not self.steer(sample) or length_of(self.steered) == 0:
@@ -176,13 +177,13 @@ class RrtKernel:
             self.backward.collect_nearest(pose, self.near_count(), self.max_edge)
         if self.step > 0 and (self.backward.count == 0
                               or self.backward.keys[self.backward.count - 1] > length_of(self.steered)):
-            # The edge as it was steered: solved anew, rounding of the pose can make it longer by a full circle.
+            # Insert the edge as it was steered: solved again, the rounded pose can make it longer by a full circle.
             self.backward.insert(self.closest.nodes[0], self.steered)
         if self.backward.count == 0:
             return
         node: cython.int
         if self.backward.keys[0] == 0:
-            # The goal is drawn again and again; once it is in the tree, that is another try to reach it from elsewhere.
+            # The pose is a node already, as the goal is when it is drawn again: try to find it a better parent.
             node = self.backward.nodes[0]
             self.choose_parent(pose, node, self.tree.costs[node] - LEAST_GAIN)
             return
@@ -192,7 +193,7 @@ class RrtKernel:
             self.rewire(node, radius)
 
     def near_count(self):
-        """Return how many nodes are near."""
+        """Return the number of near nodes by the size of the tree."""
         return cython.cast(cython.int, ceil(self.near_factor * log(self.tree.indexed + 1)))
 
     def cost_to_go(self, pose):
@@ -225,9 +226,9 @@ class RrtKernel:
         return True
 
     def choose_parent(self, pose, node, limit):
-        """Attach the pose by the cheapest free edge from its near nodes, if it then costs less than `limit`.
+        """Connect the pose by the free edge from its near nodes that makes it cheapest, if it then costs less than `limit`.
 
-        `node` is the pose's own, or -1 to add one; what is returned is the node, or -1 where no edge serves.
+        `node` is the pose's node, or -1 to add one. Return the node, or -1 where no edge will do.
         """
         cheapest: cython.double
         cost: cython.double
@@ -254,7 +255,7 @@ class RrtKernel:
         return node
 
     def rewire(self, node, radius):
-        """Reroute through `node` each near node that is cheaper so, and free. Its ancestors cannot be cheaper."""
+        """Make `node` the parent of each near node that becomes cheaper by a free edge; its ancestors never do."""
         i: cython.int
         near: cython.int
         self.forward.collect_cheaper(node, radius, LEAST_GAIN)
@@ -265,7 +266,7 @@ class RrtKernel:
                 self.tree.reparent(near, node, self.forward.curve_at(i))
 
     def add(self, pose, parent, curve):
-        """Add a node, and note it where it reaches the goal."""
+        """Add a node, to the goal nodes too if it reaches the goal."""
         node: cython.int = self.tree.add(pose, parent, curve)
         dx: cython.double = pose.x - self.goal.x
         dy: cython.double = pose.y - self.goal.y

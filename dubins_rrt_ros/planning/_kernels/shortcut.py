@@ -1,10 +1,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Path smoothing: a path made shorter by random shortcuts and vertex perturbations of Dubins curves that are as free.
+"""Path smoothing by random shortcuts and vertex perturbations.
 
-A shortcut leaves the path at one place and comes back at a later one by the Dubins curve between the two; a vertex perturbation
-does so over a pose near the path between the two. Both are taken only where they are shorter than the piece of the path that they
-replace. Perturbations let a path settle against the obstacles: each pose between two curves finds its best place and heading by
-trial. (S. Sekhavat et al. 1998 for non-holonomic shortcuts; OMPL's PathSimplifier has both.)
+A shortcut replaces a piece of the path by the Dubins curve between its ends. A vertex perturbation replaces it by two curves over
+a pose near the middle of the piece, so that the poses between curves find their best places and headings by trial. A change is
+made only where it is free and shorter than the piece that it replaces. Non-holonomic shortcuts are due to S. Sekhavat et al.
+(1998); OMPL's PathSimplifier has both.
 """
 
 import cython
@@ -32,17 +32,17 @@ else:
     from .collision import CollisionChecker
     from .dubins import TWO_PI, UNLIMITED, Curve, Pose, along, drive, length_of, part_of, rounding_at, shortest_below, turn_of
 
-#: Least gain that counts [m]; a smaller one is rounding.
+#: Least gain for which the path is changed [m]; a smaller one is rounding.
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
-#: Length of the shortest pieces of a path that are replaced, in turning radii.
+#: Length of the shortest piece of a path that is replaced, in turning radii.
 LEAST_SPAN = cython.declare(cython.double, 0.25)
 #: Natural logarithm of the ratio of the coarsest to the finest perturbations.
 FINENESS = cython.declare(cython.double, 7)
-#: Number of tries after which poses that are no longer of use are left out.
+#: Number of tries after which poses that are no longer needed are removed.
 TRIES_PER_CLEARING = cython.declare(cython.int, 64)
 #: Share of the perturbations that move a pose between its neighbours.
 VERTEX_SHARE = cython.declare(cython.double, 0.7)
-#: Maximum number of curves that one change puts in: the rest of the one where it leaves the path, and two of a perturbation.
+#: Maximum number of curves in a change: the first part of the curve on which it leaves the path, and two of a perturbation.
 MAX_NEW = 3
 
 
@@ -54,16 +54,17 @@ class Shortcutter:
         count: number of poses; the first `count` entries of the arrays are in use.
         poses: (n, 3): x [m], y [m], theta [rad].
         words, lengths: (n,) and (n, 3): the curves to the poses, in metres; those of the first mean nothing.
-        ends: (n,): how far along the path the poses are [m].
+        ends: (n,): the arc length of the path up to each pose [m].
     """
 
     def __init__(self, checker: CollisionChecker, radius: cython.double, poses, words, lengths, tries):
-        """
+        """Copy a path.
+
         Args:
-            checker: judges each curve that is put in; all of the path is free by it.
+            checker: judges every new curve; the path is free by it.
             radius: the turning radius [m].
-            poses, words, lengths: of the path.
-            tries: room is made for this many.
+            poses, words, lengths: of the path, as in the attributes.
+            tries: number of changes that will be tried, for which room is made.
         """
         self.checker, self.radius = checker, radius
         self.count = len(poses)
@@ -78,7 +79,10 @@ class Shortcutter:
         self.measure_from(1)
 
     def improve(self, draws: cython.double[:, ::1], shortcuts: cython.double):
-        """Try a change for each row of (n, 6) draws: four uniform in [0, 1), two normal; the share `shortcuts` are such."""
+        """Try a change for each row of (n, 6) draws, four uniform in [0, 1) and two normal.
+
+        `shortcuts` is the share of shortcuts among the changes.
+        """
         i: cython.int
         with cython.nogil:
             self.clear()
@@ -104,18 +108,18 @@ class Shortcutter:
         if direct:
             self.try_shortcut(begin, end)
         else:
-            # What the draw of where, back and ahead left unused says how fine the perturbation is.
+            # The draws for both ends serve once more, for the size of the perturbation.
             self.try_perturbation(begin, middle, end, (back + ahead) / 2, across, turn)
 
     def try_shortcut(self, begin, end):
-        """Go straight from one place along the path to a later one, if that is shorter and free."""
+        """Replace the path between two arc lengths by one curve, if that is shorter and free."""
         target: Pose = self.pose_at(end)
         self.leave(begin)
         if self.drive_to(target, end - begin - LEAST_GAIN) and self.new_is_free():
             self.come_back(end)
 
     def try_perturbation(self, begin, middle, end, fine, across, turn):
-        """Go over a pose near the one in the middle, if that is shorter and free."""
+        """Replace the path between two arc lengths by two curves over a pose near the one in the middle, if shorter and free."""
         size: cython.double = exp(-FINENESS * fine)
         via: Pose = self.pose_at(middle)
         across *= size * min(end - begin, 2 * self.radius)
@@ -131,7 +135,7 @@ class Shortcutter:
             self.come_back(end)
 
     def leave(self, s):
-        """Begin a change `s` along the path."""
+        """Begin a change at arc length `s` of the path."""
         edge: cython.int = self.edge_at(s)
         pose: Pose = self.pose_at(s)
         self.leave_pose(edge if s >= self.ends[edge] else edge - 1, pose)
@@ -140,12 +144,12 @@ class Shortcutter:
             self.kept = 1
 
     def leave_pose(self, pose, at):
-        """Begin a change behind a pose of the path, at a place on the curve from it."""
+        """Begin a change at `at`, on the curve that follows a pose of the path."""
         self.left, self.new, self.kept = pose + 1, 0, 0
         self.begin = self.at = at
 
     def drive_to(self, target, limit):
-        """Add the Dubins curve to a pose to the change, if it is shorter than `limit`; return whether it is."""
+        """Append the Dubins curve to `target` to the change, if shorter than `limit`; return whether it is."""
         curve: Curve = shortest_below(self.at, target, self.radius, rounding_at(target.x, target.y), limit)
         if curve.first == UNLIMITED:
             return False
@@ -154,7 +158,7 @@ class Shortcutter:
         return True
 
     def append(self, pose, curve):
-        """Add a pose to the change, reached by a curve."""
+        """Append a pose and the curve to it to the change."""
         self.new_poses[self.new, 0], self.new_poses[self.new, 1], self.new_poses[self.new, 2] = pose.x, pose.y, pose.theta
         self.new_words[self.new] = curve.word
         self.new_lengths[self.new, 0] = curve.first
@@ -175,7 +179,7 @@ class Shortcutter:
         return Pose(self.poses[pose, 0], self.poses[pose, 1], self.poses[pose, 2])
 
     def new_is_free(self):
-        """Return whether the curves of the change that are not pieces of the path keep the clearance."""
+        """Return whether the curves of the change are free, but for those that are pieces of the path."""
         pose: Pose = self.begin
         i: cython.int
         for i in range(self.kept, self.new):
@@ -185,13 +189,13 @@ class Shortcutter:
         return True
 
     def is_free(self, pose, curve):
-        """Return whether a curve is free. Most that are not are blocked in the middle, so that is looked at first."""
+        """Return whether a curve is free. Its middle is checked first, where most blocked curves are blocked."""
         middle: Pose = drive(pose, self.radius, turn_of(curve.word, 0), curve.first)
         middle = drive(middle, self.radius, turn_of(curve.word, 1), curve.second / 2)
         return self.checker.pose_is_free(middle) and self.checker.motion_is_free(pose, self.radius, curve)
 
     def come_back(self, s):
-        """Put the change in place of the path from where it left to `s` along it."""
+        """Replace the path, from where the change left it to arc length `s`, by the change."""
         edge: cython.int = self.edge_at(s)
         rest: Curve
         if s < self.ends[edge]:
@@ -202,7 +206,7 @@ class Shortcutter:
         self.put_in(edge)
 
     def put_in(self, tail):
-        """Put the change between the pose where it left and the pose `tail`."""
+        """Insert the change between the pose where it left the path and the pose `tail`."""
         self.move_tail(tail, self.left + self.new)
         i: cython.int
         part: cython.int
@@ -214,7 +218,7 @@ class Shortcutter:
         self.measure_from(self.left)
 
     def clear(self):
-        """Leave out the poses whose neighbours are joined by a free curve that is no longer than the way over them."""
+        """Remove the poses whose neighbours are joined by a free curve that is no longer than the path over them."""
         pose: cython.int = 1
         while pose < self.count - 1:
             self.leave_pose(pose - 1, self.pose_of(pose - 1))
@@ -244,13 +248,13 @@ class Shortcutter:
             self.lengths[to, part] = self.lengths[pose, part]
 
     def measure_from(self, first):
-        """Sum up how far along the path the poses from `first` on are."""
+        """Recompute `ends` from the pose `first` on."""
         i: cython.int
         for i in range(first, self.count):
             self.ends[i] = self.ends[i - 1] + length_of(self.curve_to(i))
 
     def edge_at(self, s):
-        """Return the pose whose curve holds the place `s` along the path, the first one of two."""
+        """Return the pose whose curve holds the arc length `s` of the path, the first of two."""
         low: cython.int = 1
         high: cython.int = self.count - 1
         middle: cython.int
@@ -263,7 +267,7 @@ class Shortcutter:
         return low
 
     def pose_at(self, s):
-        """Return the pose `s` along the path; where one of its poses is, exactly that."""
+        """Return the pose at arc length `s` of the path: exactly one of its poses where it ends a curve."""
         edge: cython.int = self.edge_at(s)
         if s >= self.ends[edge]:
             return self.pose_of(edge)

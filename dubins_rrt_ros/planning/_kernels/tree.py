@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The search tree: a structure of arrays. A node's edge comes from its parent: a word and three lengths."""
+"""The search tree: a structure of arrays, hashed by position. A node's edge is the curve from its parent to it."""
 
 import cython
 import numpy as np
@@ -16,9 +16,9 @@ else:
     from .dubins import Curve, Pose, rounding_at
     from .edge_cost import edge_cost
 
-#: About how many buckets there are at first. It must not depend on the budget: the order of a bucket's nodes is that of rewiring.
+#: Approximate number of buckets at first; not a function of the budget, since the order of nodes in buckets is that of rewiring.
 BUCKETS = 1024
-#: There are made more of them where there are more than so many nodes for each, up to a largest number of them.
+#: Mean number of nodes in a bucket above which more buckets are made, and the maximum number of these.
 MOST_PER_BUCKET, MOST_BUCKETS = 8, 1 << 22
 
 
@@ -27,19 +27,19 @@ class SearchTree:
     """A tree of poses, hashed by position.
 
     Attributes:
-        size: how many nodes there are; node 0 is the root. The arrays are longer.
-        indexed: how many of them are found as neighbours.
+        size: number of nodes; node 0 is the root. The arrays are longer.
+        indexed: number of nodes that can be found as neighbours.
         radius: the turning radius of all edges [m].
-        rounding: by how much the rounding of coordinates may move what lies between two poses [m].
+        rounding: largest error of the difference between two coordinates [m].
         poses: (n, 3): x [m], y [m], theta [rad].
         headings: (n, 2): sine and cosine of theta.
         parents: (n,), the root's is -1.
-        costs: (n,): the length of the path from the root [m].
+        costs: (n,): the cost of the path from the root [m].
         words, lengths: (n,) and (n, 3): the edges from the parents; lengths in metres.
     """
 
     def __init__(self, root, radius: cython.double, corner, extent):
-        """A tree of its root alone.
+        """Make a tree of its root alone.
 
         Args:
             root: (x, y, theta).
@@ -130,7 +130,7 @@ class SearchTree:
         self.indexed += 1
 
     def prune_index(self, wanted: cython.schar[::1]):
-        """Let only those of the (size,) nodes that are not 0 be found as neighbours from now on."""
+        """Leave only the nodes whose entry in the (size,) array `wanted` is not 0 to be found as neighbours."""
         node: cython.int
         self.buckets[:, :] = -1
         self.indexed = 0
@@ -140,7 +140,7 @@ class SearchTree:
                     self.index(node)
 
     def rehash(self):
-        """Make more buckets, if there are many nodes for each. To be called at moments that depend on the samples alone."""
+        """Make more buckets if these are full. To be called at moments that depend on the samples alone."""
         count: cython.int = self.buckets.shape[0] * self.buckets.shape[1]
         if self.indexed <= MOST_PER_BUCKET * count or count >= MOST_BUCKETS:
             return

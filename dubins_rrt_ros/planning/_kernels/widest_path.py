@@ -1,8 +1,8 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The widest way between points of a square lattice: the one whose narrowest place has the most clearance.
+"""The widest path (bottleneck shortest path) on a square grid: the one whose least clearance is greatest.
 
-A flood that enters the neighbour with the most clearance first. What has at least the clearance of the narrowest place so
-far, the level, waits in a queue, first in, first out, so that ways are short in open space; what has less waits in a heap.
+A flood enters the neighbour with the most clearance first. The level is the least clearance that was needed so far. Nodes with at
+least that clearance wait in a queue, first in, first out, so that paths are short in open space; all others wait in a heap.
 """
 
 import cython
@@ -15,7 +15,7 @@ else:
     from .clearance import Clearance
     from .heap import Heap
 
-#: What is known of a node: how it was entered (from the left, the right, below, above, or as the start), or nothing.
+#: States of a node: not entered; entered from the left, the right, below, above; or the start.
 UNSEEN = cython.declare(cython.schar, 0)
 FROM_LEFT = cython.declare(cython.schar, 1)
 FROM_RIGHT = cython.declare(cython.schar, 2)
@@ -26,16 +26,18 @@ START = cython.declare(cython.schar, 5)
 
 @cython.cclass
 class WidestPathSearch:
-    """A flood over a lattice; node `row * columns + column` lies `column` steps along and `row` steps across from the first."""
+    """A flood over a grid; node `row * columns + column` lies `column` steps along and `row` steps across from the first."""
 
     def __init__(self, clearance: Clearance, first, along, shape, is_target, least, enough):
-        """
+        """Prepare a search from any node.
+
         Args:
-            first, along: (x, y) of the first node, and the step along a row [m]; that across is the same turned left.
+            first: (x, y) of the first node [m].
+            along: (x, y) of the step along a row [m]; the step across is the same turned left.
             shape: (rows, columns).
             is_target: (rows * columns,) int8, not 0 for each node where the flood may end.
-            least: nodes without more clearance than this are not entered [m].
-            enough: more clearance than this counts as this [m].
+            least: clearance that nodes must exceed to be entered [m].
+            enough: clearance above which more does not count [m].
         """
         self.clearance = clearance
         self.rows, self.columns = shape
@@ -49,15 +51,17 @@ class WidestPathSearch:
         self.queued = 0
 
     def widest_path(self, start: cython.int):
-        """The least clearance on the widest way [m], at most `enough`, and the way's nodes as (n,) int32; 0 and none
-        where no target can be reached."""
+        """Return the least clearance on the widest path [m], at most `enough`, and the nodes of the path as (n,) int32.
+
+        Where no target can be reached, these are 0 and empty.
+        """
         target: cython.int
         with cython.nogil:
             target = self.flood(start)
         return (self.level, self.nodes_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
 
     def flood(self, start):
-        """Flood from `start` until a target is reached, and return it, or -1."""
+        """Flood from `start` until a target is reached; return that, or -1."""
         node: cython.int
         row: cython.int
         column: cython.int
@@ -84,7 +88,7 @@ class WidestPathSearch:
         return -1
 
     def enter(self, node, how):
-        """Let an unseen node wait in the queue or the heap, if it has more than the least clearance."""
+        """Queue a node, or put it into the heap, unless it was seen or has too little clearance."""
         if self.entered[node] != UNSEEN:
             return
         self.entered[node] = how
@@ -102,8 +106,8 @@ class WidestPathSearch:
             self.heap.push(node, -found)
 
     def nodes_to(self, node: cython.int):
-        """(n,) int32: the nodes by which `node` was reached, from the start on."""
-        way = [node]
+        """Return the nodes of the path from the start to `node`, (n,) int32."""
+        path = [node]
         while self.entered[node] != START:
             if self.entered[node] == FROM_LEFT:
                 node -= 1
@@ -111,5 +115,5 @@ class WidestPathSearch:
                 node += 1
             else:
                 node += -self.columns if self.entered[node] == FROM_BELOW else self.columns
-            way.append(node)
-        return np.array(way[::-1], np.int32)
+            path.append(node)
+        return np.array(path[::-1], np.int32)

@@ -32,14 +32,14 @@ def audit_curves(curves: Sequence["DubinsCurve"], ends: Sequence[Pose], problem:
         if not (off <= TOLERANCE and turned <= TOLERANCE):
             findings.append(f"curve {i} ends {off:.6g} m and {turned:.6g} rad from where it shall, {tuple(there)}")
     too_near, _ = clearance_findings(arcs, problem)
-    if too_near:  # which tells one place for all curves
+    if too_near:  # names one place of all curves
         found = ((i, clearance_findings(_only(curve, problem), problem)[0]) for i, curve in enumerate(curves))
         findings += [f"along curve {i}, {curve_finding}" for i, some in found for curve_finding in some] or too_near
     return tuple(findings)
 
 
 def curve_gap(curve: "DubinsCurve", problem: Problem) -> tuple[float, float]:
-    """The least gap between the vehicle and the obstacles along a curve, as it was measured, and by how much less it may be [m].
+    """Return the least gap measured between vehicle and obstacles along a curve, and how much less it can be [m].
 
     Where there is contact, the gap is that of the first contact found: 0, or for a disc minus how deep it is.
     """
@@ -48,7 +48,7 @@ def curve_gap(curve: "DubinsCurve", problem: Problem) -> tuple[float, float]:
 
 
 def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
-    """The gaps between the vehicle and the obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
+    """Return the gaps between vehicle and obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
     world_map, unknown, vehicle = problem.map, problem.allow_unknown, problem.vehicle
     x, y, theta = np.asarray(poses, dtype=float).T
     if not vehicle.footprint:
@@ -63,7 +63,7 @@ def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def clearances(points: np.ndarray, problem: Problem) -> np.ndarray:
-    """The distances of (n, 2) points from the obstacles [m]; 0 in one."""
+    """Return the distances of (n, 2) points from the obstacles [m]; 0 in one."""
     return obstacles_of(problem.map, problem.allow_unknown).distance(*np.asarray(points, dtype=float).T)
 
 

@@ -1,4 +1,4 @@
-"""The obstacles' true shapes, for the audit: how far points, and polygons on a path, are from them.
+"""The obstacles' true shapes, for the audit: the distances of points, and of polygons along a path, from them.
 
 For a grid they are the squares of its blocked cells and what is outside of it, for polygons what is outside of them.
 """
@@ -10,18 +10,18 @@ import shapely
 
 from ..maps.model import GridMap, Map, blocked_cells
 
-#: Obstacles in a grid are looked for within so many cells of a point at first.
+#: Number of cells around a point within which obstacles are sought at first.
 FIRST_REACH = 8
-#: Cells are read, and kept, in square tiles with a margin around: the margin at least, the side of a tile in margins.
+#: Least margin [cells] around the square tiles in which cells are read, and the side of a tile in margins.
 MARGIN, TILE = 64, 8
-#: About how many rows of cells are searched at once, for the sake of memory.
+#: Approximate number of rows of cells that are searched at once, for the sake of memory.
 ROWS_AT_ONCE = 1_000_000
-#: Along the path of a polygon cells are read in squares of so many to a side.
+#: Side of the squares in which cells along the path of a polygon are read [cells].
 BLOCK = 32
 
 
 class PolygonObstacles:
-    """What is outside of polygons."""
+    """The outside of polygons."""
 
     def __init__(self, free: shapely.Geometry):
         self._free = free
@@ -30,17 +30,18 @@ class PolygonObstacles:
         self._tree = shapely.STRtree(shapely.linestrings(edges))
 
     def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Of points from the obstacles; 0 in one."""
+        """Return the distances of points from the obstacles [m]; 0 in one."""
         inside = shapely.contains_xy(self._free, x, y)
         out = np.zeros(len(x))
         out[inside] = _to_nearest(self._tree, shapely.points(x[inside], y[inside]))
         return out
 
     def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
-        """Of polygons, or of the convex hulls of their corners, from the obstacles; 0 where they meet.
+        """Return the distances of polygons, or of their convex hulls, from the obstacles [m]; 0 where they meet.
 
         Args:
             corners: (n, c) complex, x + iy [m].
+            hull: True for the convex hulls of the corners.
         """
         # Where no edge is in a shape, all of it is on the side of the edges that its first corner is on.
         inside = shapely.contains_xy(self._free, corners[:, 0].real, corners[:, 0].imag)
@@ -58,7 +59,7 @@ class GridObstacles:
         self._windows: dict[tuple[int, complex], _Window] = {}
 
     def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Of points from the obstacles; 0 in one."""
+        """Return the distances of points from the obstacles [m]; 0 in one."""
         x0, y0, yaw = self._origin
         rows, columns = self._data.shape
         place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
@@ -73,7 +74,7 @@ class GridObstacles:
         return distances
 
     def _within(self, reach: int, place: np.ndarray) -> np.ndarray:
-        """How far points in the grid are from blocked cells, in cells; infinity where none is nearer than `reach`."""
+        """Return the distances of points in the grid from blocked cells, in cells; infinity from `reach` on."""
         margin = max(MARGIN, reach)
         side = TILE * margin
         tiles = place.real // side + 1j * (place.imag // side)
@@ -89,7 +90,7 @@ class GridObstacles:
         return np.where(out < reach, out, math.inf)
 
     def _window(self, corner: complex, side: int, margin: int) -> "_Window":
-        """The cells of a square tile and those within the margin around it."""
+        """Return the cells of a square tile and those within the margin around it."""
         left, low = max(0, int(corner.real) - margin), max(0, int(corner.imag) - margin)
         part = self._data[low:int(corner.imag) + side + margin, left:int(corner.real) + side + margin]
         return _Window(blocked_cells(part, self._allow_unknown), left, low)
@@ -112,9 +113,9 @@ class _Window:
         self._left, self._low = left - 1, low
 
     def distance(self, place: np.ndarray, reach: int) -> np.ndarray:
-        """Of points from the blocked cells, in cells, where it is below `reach`; elsewhere it is `reach` or more.
+        """Return the distances of points from the blocked cells, in cells; exact below `reach`, at least `reach` elsewhere.
 
-        In each of the rows so near to a point that hold such cells, the next to the left and to the right are looked up.
+        In each row within reach that holds blocked cells, the next ones to the left and to the right are looked up.
         """
         if not len(self._rows):
             return np.full(len(place), math.inf)
@@ -134,8 +135,8 @@ class PathsideSquares:
 
     Args:
         points: of the path, x + iy [m].
-        margin: how far from the nearest of those points a shape may extend [m].
-        reach: how far from a shape obstacles matter [m]; cells further than margin and reach from the points are not read.
+        margin: maximum distance of a shape's points from the nearest of those points [m].
+        reach: maximum distance from a shape at which obstacles matter [m]; cells beyond margin and reach are not read.
     """
 
     def __init__(self, grid: GridMap, allow_unknown: bool, points: np.ndarray, margin: float, reach: float):
@@ -150,10 +151,11 @@ class PathsideSquares:
         self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
 
     def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
-        """Of polygons, or of the convex hulls of their corners, from the obstacles, 0 where they meet; never more than `reach`.
+        """Return the distances of polygons, or of their convex hulls, from the obstacles: 0 where they meet, at most `reach`.
 
         Args:
             corners: (n, c) complex, x + iy [m].
+            hull: True for the convex hulls of the corners.
         """
         place = self._place(corners)
         rows, columns = self._grid.data.shape
@@ -165,13 +167,13 @@ class PathsideSquares:
         return np.minimum(out * self._grid.resolution, self.reach)
 
     def _place(self, points: np.ndarray) -> np.ndarray:
-        """Points in the grid's own frame, in cells."""
+        """Return points in the grid's own frame, in cells."""
         x, y, yaw = self._grid.origin
         place: np.ndarray = (points - complex(x, y)) * np.exp(-1j * yaw) / self._grid.resolution
         return place
 
     def _blocks_near(self, points: np.ndarray, distance: float) -> np.ndarray:
-        """Which blocks of the grid hold everything within a distance of points, in cells."""
+        """Return which blocks of the grid hold everything within a distance of points, in cells."""
         near = np.zeros([-(-cells // BLOCK) for cells in self._grid.data.shape], bool)
         place = self._place(points) / BLOCK
         # A point outside the grid may count as one at its edge: there the shape meets an obstacle wherever the cells are.
@@ -183,16 +185,16 @@ class PathsideSquares:
 
 
 def _runs(cells: np.ndarray) -> np.ndarray:
-    """(n, 3) row, first column and the column after the last of the runs of True along the rows of an array."""
+    """Return (n, 3) row, first column and the column after the last, of the runs of True along the rows of an array."""
     padded = np.pad(cells, ((0, 0), (1, 1)))
     row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
     return np.column_stack([row[::2], column[::2], column[1::2]])
 
 
 def _rectangles(cells: np.ndarray) -> np.ndarray:
-    """(n, 4) first column, first row, and those after the last, of rectangles that make up what is True.
+    """Return (n, 4) first column, first row, and those after the last, of rectangles that cover the cells that are True.
 
-    They are the runs along rows, and where such are alike in successive rows, they are one.
+    They are the runs along rows; equal runs in successive rows are one rectangle.
     """
     row, first, end = _runs(cells).T
     order = np.lexsort((row, end, first))
@@ -203,13 +205,13 @@ def _rectangles(cells: np.ndarray) -> np.ndarray:
 
 
 def _shapes(corners: np.ndarray, hull: bool) -> np.ndarray:
-    """The polygons with these corners, (n, c) complex, or the convex hulls of them."""
+    """Return the polygons with (n, c) complex corners, or their convex hulls."""
     coordinates = np.stack([corners.real, corners.imag], axis=-1)
     return np.asarray(shapely.convex_hull(shapely.linestrings(coordinates)) if hull else shapely.polygons(coordinates))
 
 
 def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray) -> np.ndarray:
-    """How far shapes are from the nearest in a tree."""
+    """Return the distances of shapes from the nearest one in a tree."""
     _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
     return np.asarray(distance)
 

@@ -1,8 +1,8 @@
-"""The audit of poses alone, such as those of another planner: of what a car does that drives from each to the next.
+"""The audit of poses alone, such as those of another planner, as if a car drove from each to the next.
 
-Between two poses it drives the arc of constant curvature that turns from the one's yaw to the other's. A car's poses lie on such
-arcs; what a pose is off, to the side or behind, no car can drive. As much as few digits account for is granted, but it must not
-add up: so every stretch of the path is judged, from one step to all of it.
+Between two poses the car drives the arc of constant curvature that turns from one yaw to the other. A car's poses lie on such
+arcs; no car can drive to a pose that lies beside or behind the end of its arc. Rounding of the poses is tolerated, but must not
+add up: every stretch of the path is judged, from a single step to the whole.
 """
 
 import math
@@ -14,24 +14,24 @@ from ..problem import Problem
 from .sweep import Arcs, clearance_findings
 from .verdict import TOLERANCE, Audit, apart, goal_findings
 
-#: A step shorter than this is a turn on the spot [m].
+#: Length below which a step counts as a turn on the spot [m].
 STEP = 1e-9
 
 
 def audit_poses(poses: np.ndarray, problem: Problem, tolerance_xy: float = 1e-3, tolerance_yaw: float = 1e-3) -> Audit:
-    """Judge poses that a vehicle shall drive through: their ends, whether a car can drive so, and the clearance in between.
+    """Judge poses that a vehicle is to drive through: their ends, their turns, and the clearance in between.
 
     Over a stretch of any length they may turn by `tolerance_yaw` more than the turning radius allows, run to the side by
-    `tolerance_xy` and a share of `tolerance_yaw` of the length, and back by `tolerance_xy`. The most that a pose is off its
-    arc is added to the clearance needed.
+    `tolerance_xy` and a share of `tolerance_yaw` of the length, and back by `tolerance_xy`. The greatest
+    distance of a pose from its arc is added to the required clearance.
 
     Args:
         poses: (n, 3) x [m], y [m], yaw [rad], finite; at least one.
         problem: with the map, the vehicle and the ends.
-        tolerance_xy, tolerance_yaw: how far poses may be off [m, rad].
+        tolerance_xy, tolerance_yaw: maximum errors of the poses [m, rad].
 
     Returns:
-        The findings, of each kind the worst. The greatest curvature is that of single steps, where few digits show most.
+        The findings, of each kind the worst. The greatest curvature is that of a single step, where rounding shows most.
     """
     steps = _Steps.between(poses)
     findings = [*_end_findings(poses, problem, tolerance_xy, tolerance_yaw),
@@ -43,13 +43,13 @@ def audit_poses(poses: np.ndarray, problem: Problem, tolerance_xy: float = 1e-3,
 
 
 def driven_length(poses: np.ndarray) -> float:
-    """Of the arcs through poses (n, 3) [m]."""
+    """Return the length of the arcs through (n, 3) poses [m]."""
     return float(_Steps.between(poses).length.sum())
 
 
 @dataclass(frozen=True)
 class _Steps:
-    """From each pose to the next: by how much it turns [rad], and the arc's length, what it is off to the left and ahead [m]."""
+    """The steps from each pose to the next: the turn [rad], the arc's length, and the offset of the pose from its end [m]."""
 
     turn: np.ndarray
     length: np.ndarray
@@ -68,16 +68,16 @@ class _Steps:
 
     @property
     def curvature(self) -> np.ndarray:
-        """Of the arcs [1/m]; 0 on the spot."""
+        """The curvatures of the arcs [1/m]; 0 for turns on the spot."""
         return np.asarray(np.divide(self.turn, self.length, out=np.zeros(len(self.turn)), where=self.length > STEP))
 
     def slack(self, reach: float) -> float:
-        """How far a vehicle that reaches so far around its reference point may be from where the arcs have it [m]."""
+        """Return the largest distance of a vehicle's point, within `reach` of its middle, from where the arcs put it [m]."""
         on_the_spot = np.where(self.length > STEP, 0.0, np.abs(self.turn))
         return float((np.hypot(self.left, self.ahead) + reach * on_the_spot).max(initial=0.0))
 
     def arcs(self, poses: np.ndarray) -> Arcs:
-        """What is driven, and the last pose."""
+        """Return the arcs from each pose to the next, and one of no length at the last."""
         x, y, theta = poses.T
         return Arcs(x, y, theta, np.append(self.curvature, 0.0), np.append(self.length, 0.0))
 
@@ -91,16 +91,16 @@ def _end_findings(poses: np.ndarray, problem: Problem, tolerance_xy: float, tole
 
 
 def _motion_findings(poses: np.ndarray, steps: _Steps, radius: float, tolerance_xy: float, tolerance_yaw: float) -> list[str]:
-    """What no car of the turning radius does."""
+    """Return what no car with the turning radius can drive: the worst stretch of each kind."""
     if not len(steps.turn):
         return []
-    allowed, row_gap = steps.length / radius * (1 + TOLERANCE), tolerance_yaw * steps.length
+    allowed, sideways = steps.length / radius * (1 + TOLERANCE), tolerance_yaw * steps.length
     findings = []
     for excess, tolerance, does in (
             (steps.turn - allowed, tolerance_yaw, f"turns left {{:.6f}} rad more than a radius of {radius:g} m allows"),
             (-steps.turn - allowed, tolerance_yaw, f"turns right {{:.6f}} rad more than a radius of {radius:g} m allows"),
-            (steps.left - row_gap, tolerance_xy, "runs {:.6f} m more to the left than its yaw allows"),
-            (-steps.left - row_gap, tolerance_xy, "runs {:.6f} m more to the right than its yaw allows"),
+            (steps.left - sideways, tolerance_xy, "runs {:.6f} m more to the left than its yaw allows"),
+            (-steps.left - sideways, tolerance_xy, "runs {:.6f} m more to the right than its yaw allows"),
             (-steps.ahead, tolerance_xy, "runs {:.6f} m backward, which the vehicle cannot")):
         amount, first, last = _worst_stretch(excess)
         if amount > tolerance:
@@ -111,7 +111,7 @@ def _motion_findings(poses: np.ndarray, steps: _Steps, radius: float, tolerance_
 
 
 def _worst_stretch(excess: np.ndarray) -> tuple[float, int, int]:
-    """The largest sum of successive values, the index of the first of them and that after the last."""
+    """Return the largest sum of successive values, the index of the first of them and that after the last."""
     total = np.append(0.0, np.cumsum(excess))
     last = int(np.argmax(total[1:] - np.minimum.accumulate(total[:-1]))) + 1
     first = int(np.argmin(total[:last]))

@@ -1,4 +1,4 @@
-"""What a vehicle sweeps along arcs, for the audit: its least clearance, with an error bound that holds between samples too.
+"""The least clearance of a vehicle along arcs, for the audit, with an error bound that holds between samples too.
 
 A disc is judged by the point in its middle. On a piece of length s with clearances c and c' at its ends no point has less than
 (c + c' - s) / 2, since the clearance changes by at most a metre per metre.
@@ -22,28 +22,27 @@ from ..problem import Problem
 from ..vehicle import Vehicle
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 
-#: A sample this much too near an obstacle is a finding [m]; what may lie between samples is at most that nearer still.
+#: Penetration that counts as a violation [m]; between samples at most twice this goes unnoticed.
 CONTACT = 1e-6
-#: A vehicle without extent is judged as a disc of this radius [m]: a point may cross a line that it keeps the distance 0 to.
+#: Least radius of a disc that is judged [m]: a point could cross a line at a clearance of 0.
 POINT = 1e-5
-#: What a polygon must keep to the obstacles, as a disc its radius [m]: more than 2 CONTACT, for where it is in an obstacle its
-#: distance is 0 however deep.
+#: Required clearance of a polygon [m]. It exceeds 2 CONTACT, since in an obstacle the distance is 0 at any depth.
 TOUCH = 3 * CONTACT
-#: The least clearance is found to within this [m], or to within this share of it.
+#: Absolute [m] and relative error of the least clearance; the larger one counts.
 PRECISION, SHARE = 1e-3, 0.02
-#: With more pieces than this open the clearance counts as undecidable: the path grazes the obstacles all along.
+#: Number of open pieces above which the clearance is undecidable, as of a path that grazes obstacles all along.
 MOST_PIECES = 500_000
-#: About how many pieces a path is cut into at first.
+#: Approximate number of pieces that a path is cut into at first.
 FIRST_PIECES = 64
-#: Obstacles in a grid are looked for within so many cells of a polygon at first.
+#: Number of cells around a polygon within which obstacles are sought at first.
 FIRST_CELLS = 24
-#: About so many points of a path, at most, tell which cells are near.
+#: Approximate maximum number of points along a path around which cells are read.
 MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True)
 class Arcs:
-    """Arcs as arrays: where they begin, their curvature [1/m] (left is positive) and their length [m]."""
+    """Arcs as arrays: the poses at which they begin [m, rad], their curvatures [1/m], positive to the left, and lengths [m]."""
 
     x: np.ndarray
     y: np.ndarray
@@ -52,14 +51,14 @@ class Arcs:
     length: np.ndarray
 
     def at(self, index: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The poses at arc lengths `s` of the arcs `index`: along the chord, which halves the turn."""
+        """Return the poses at arc lengths `s` of the arcs `index`: along the chord, which halves the turn."""
         half = self.curvature[index] * s / 2
         chord = s * np.sinc(half / math.pi)
         direction = self.theta[index] + half
         return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
 
     def pieces(self, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Each arc cut into pieces of one size, at most that long: their arcs' indices, where they begin and their sizes."""
+        """Cut each arc into pieces of one size, at most `longest`; return the indices of their arcs, their begins and sizes."""
         count = np.maximum(np.ceil(self.length / longest), 1).astype(int)
         index = np.repeat(np.arange(len(count)), count)
         nth = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
@@ -69,11 +68,11 @@ class Arcs:
 
 def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacles: Obstacles | None = None
                        ) -> tuple[list[str], float]:
-    """What is wrong with the clearance along arcs, a sentence each, and the least clearance [m].
+    """Return what is wrong with the clearance along arcs, a sentence each, and the least clearance [m].
 
     Args:
-        slack: how far the vehicle may be from where the arcs have it [m].
-        obstacles: those of the problem's map, where they are at hand.
+        slack: maximum distance of the vehicle from where the arcs put it [m].
+        obstacles: those of the problem's map, where they are known already.
     """
     vehicle = problem.vehicle
     required_clearance = slack + (TOUCH if vehicle.footprint else max(vehicle.robot_radius, POINT))
@@ -130,7 +129,7 @@ class DiscSweep:
 
     def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
               at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
-        """What pieces have at least, given their clearances at both ends."""
+        """Return lower bounds of the clearance on pieces, given the clearances at both ends of each."""
         bounds: np.ndarray = (at_begin + at_end - size) / 2
         return bounds
 
@@ -148,7 +147,7 @@ class PolygonSweep:
 
     def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
               at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
-        """What pieces have at least, given their clearances at both ends."""
+        """Return lower bounds of the clearance on pieces, given the clearances at both ends of each."""
         curvature = arcs.curvature[index]
         piece, edges = self._edges(curvature)
         corners = []

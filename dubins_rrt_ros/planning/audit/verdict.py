@@ -1,7 +1,7 @@
-"""The independent judge of paths: shapely and plain numpy, no code in common with the planner.
+"""The independent judge of paths: shapely and plain numpy, no algorithm in common with the search.
 
-It drives the curves by its own solution of the car's equations (1), and measures distances to the obstacles' true shapes. The
-verdict on clearance holds between samples too: `sweep.py` says how.
+It drives the curves by its own solution of the car's equations, and measures distances to the obstacles' true shapes. Its verdict
+on clearance holds between samples too: `sweep.py` says how.
 """
 
 import math
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from ..curves.dubins import DubinsCurve
     from ..curves.path import Path
 
-#: How far a curve may end from where the next one begins [m, rad], and relatively how much tighter a turn may be.
+#: Maximum error of a joint between two curves [m, rad], and of a turning radius, relatively.
 TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Audit:
-    """What the audit found.
+    """The verdict of an audit.
 
     Attributes:
         findings: what is wrong with the path, one sentence each; none where it is right.
         min_clearance: the least distance to the obstacles, to within a millimetre or 2 %, or where there is contact the first
             that was found: for a disc from the path, on which its middle runs, for a polygon from all that it sweeps [m].
-        max_curvature: [1/m].
+        max_curvature: the greatest curvature of the path [1/m].
     """
 
     findings: tuple[str, ...]
@@ -40,7 +40,7 @@ class Audit:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing was found."""
+        """True if nothing was found."""
         return not self.findings
 
     def __str__(self) -> str:
@@ -99,7 +99,7 @@ def _start_findings(path: "Path", problem: Problem) -> list[str]:
 
 
 def goal_findings(end: Pose, problem: Problem, tolerance_xy: float = TOLERANCE, tolerance_yaw: float = TOLERANCE) -> list[str]:
-    """What is wrong with a path's end; the tolerances [m, rad] are added to those of the goal."""
+    """Return what is wrong with a path's end; the tolerances [m, rad] are added to those of the goal."""
     off, turned = apart(end, problem.goal)
     if off <= problem.goal_tolerance_xy + tolerance_xy and turned <= problem.yaw_tolerance + tolerance_yaw:
         return []
@@ -119,6 +119,7 @@ def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[
 
 
 def turn_findings(curves: Sequence["DubinsCurve"], problem: Problem) -> list[str]:
+    """Return a sentence for each curve that turns tighter than the vehicle can."""
     least = problem.vehicle.turning_radius
     findings = []
     for i, curve in enumerate(curves):

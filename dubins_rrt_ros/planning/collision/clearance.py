@@ -1,6 +1,6 @@
 """Exact distance to the nearest obstacle, computed once per map; everything outside the map is an obstacle.
 
-Guaranteed: along a curve that `curve_is_free` accepts the vehicle touches no obstacle anywhere, between samples too, and keeps a
+Guarantee: along a curve that `curve_is_free` accepts the vehicle touches no obstacle anywhere, between samples too, and keeps a
 quarter of CLEARANCE_MARGIN from them; a curve along which it keeps CLEARANCE_MARGIN (a disc) or sqrt(2) of that (a polygon) is
 always accepted. `_kernels/clearance.py` and `_kernels/collision.py` have the proofs. The distances are those to the squares of
 occupied cells, or to polygons, in double precision; nothing is rounded to cells.
@@ -28,7 +28,7 @@ from .raster import CLEARANCE_MARGIN, grid_clearance, polygon_clearance
 
 #: Maximum side of a free square as a share of the required clearance, so that walls do not vanish between squares ...
 SQUARE_SHARE = 0.6
-#: ... unless that makes more squares than this number, about.
+#: ... and approximate maximum number of squares, for which they are made larger.
 MAX_SQUARES = 270_000 if COMPILED else 4_000
 
 
@@ -52,21 +52,21 @@ class ClearanceField:
         frame: the frame of the raster, whose origin is the corner of its first cell.
     """
 
-    def __init__(self, map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
+    def __init__(self, world_map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
         """Compute the distances.
 
         Where `previous` is the field of a grid of the same shape and resolution, only what depends on the cells that differ is
         computed; the result is the same as without it, and the previous field stays as it is.
         """
         self.kernel: GridClearance | PolygonClearance
-        if isinstance(map, GridMap):
+        if isinstance(world_map, GridMap):
             similar = previous.kernel if previous and isinstance(previous.kernel, GridClearance) else None
-            self.kernel = grid_clearance(map, allow_unknown, similar)
-            self.frame, self._polygons = Frame(*map.origin), None
+            self.kernel = grid_clearance(world_map, allow_unknown, similar)
+            self.frame, self._polygons = Frame(*world_map.origin), None
         else:
-            self.kernel = polygon_clearance(map)
-            x0, y0 = map.corners()[0].tolist()
-            self.frame, self._polygons = Frame(x0, y0, 0.0), map.free
+            self.kernel = polygon_clearance(world_map)
+            x0, y0 = world_map.corners()[0].tolist()
+            self.frame, self._polygons = Frame(x0, y0, 0.0), world_map.free
         self._forget()
 
     def _forget(self) -> None:
@@ -91,18 +91,19 @@ class ClearanceField:
     def collision_checker(self, vehicle: Vehicle) -> CollisionChecker:
         """Return the checker of a vehicle's motions on the map, for one thread."""
         if not vehicle.footprint:
-            return CollisionChecker(self.kernel, vehicle.robot_radius)
+            return CollisionChecker(clearance=self.kernel, required_clearance=vehicle.robot_radius)
         found = cover(vehicle.footprint)
-        return PolygonChecker(self.kernel, vehicle.inscribed_radius, discs=found.discs, corners=found.corners,
-                              first_corner=found.first_corner, worth=max(found.excess, 2 * CLEARANCE_MARGIN))
+        return PolygonChecker(clearance=self.kernel, required_clearance=vehicle.inscribed_radius, discs=found.discs,
+                              corners=found.corners, first_corner=found.first_corner,
+                              worth=max(found.excess, 2 * CLEARANCE_MARGIN))
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
-        """Whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
+        """Return whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
         # The kernel's distance to polygons has no sign.
         return bool(self.at(np.array(pose[:2])) > 0) and self.collision_checker(vehicle).is_pose_free(pose)
 
     def curve_is_free(self, curve: DubinsCurve, vehicle: Vehicle) -> bool:
-        """Whether the vehicle touches no obstacle along a curve; see `_kernels/clearance.py` and `_kernels/collision.py`."""
+        """Return whether the vehicle touches no obstacle along a curve; `_kernels/collision.py` states the guarantee."""
         # What starts in free space stays there, as no edge is crossed.
         if not self.at(np.array(curve.start[:2])) > 0:
             return False

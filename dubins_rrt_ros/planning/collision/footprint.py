@@ -19,13 +19,13 @@ RIM_POINTS = 361
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """What covers a footprint, in the vehicle's frame.
+    """The cover of a footprint, in the vehicle's frame: discs, and convex parts.
 
     Attributes:
-        discs: (m, 4) float64: x, y and radius of discs that cover it, and the radius of a disc there that it covers [m].
+        discs: (m, 4) float64: x, y and radius of discs that cover it, and radius of a disc with the same centre inside it [m].
         excess: how far the discs reach beyond the footprint, about [m].
-        corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and by how much they move per
-            metre that the part is made wider by, which is at most sqrt(2).
+        corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and their displacement
+            per metre by which the part is widened, at most sqrt(2).
         first_corner: (p + 1,) int32: index of the first corner of each part, and the number of corners.
     """
 
@@ -37,7 +37,7 @@ class Cover:
 
 @lru_cache(maxsize=64)
 def cover(footprint: Footprint) -> Cover:
-    """Return what covers a footprint, whose corners are counter-clockwise."""
+    """Return the cover of a footprint, whose corners are counter-clockwise."""
     polygon = shapely.Polygon(footprint)
     discs = np.array([_disc_around(piece, polygon) for piece in _pieces(polygon)])
     parts = [_widened(part) for part in _convex_parts(footprint)]

@@ -38,7 +38,7 @@ def grid_clearance(grid: GridMap, allow_unknown: bool, previous: GridClearance |
     else:
         row_gap, bounds = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
         _fill(row_gap, bounds, free, cell, *(slice(0, n) for n in free.shape))
-    return GridClearance(bounds, cell, grid.origin, CLEARANCE_MARGIN, row_gap)
+    return GridClearance(field=bounds, resolution=cell, origin=grid.origin, margin=CLEARANCE_MARGIN, row_gap=row_gap)
 
 
 def _fill(row_gap: np.ndarray, bounds: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
@@ -121,8 +121,9 @@ def polygon_clearance(polygons: PolygonMap) -> PolygonClearance:
     first = np.searchsorted(of_cell[order], np.arange(rows * columns + 1))
     bounds = _rounded_down(distance - half_diagonal)
     bounds[~shapely.contains_xy(polygons.free, centre_x.ravel(), centre_y.ravel()) & (distance > half_diagonal)] = -1
-    return PolygonClearance(bounds.reshape(rows, columns), cell, (x0, y0, 0.0), CLEARANCE_MARGIN,
-                            edges - np.array([x0, y0, x0, y0]), first.astype(np.int64), edge[order].astype(np.int32))
+    return PolygonClearance(field=bounds.reshape(rows, columns), resolution=cell, origin=(x0, y0, 0.0), margin=CLEARANCE_MARGIN,
+                            edges=edges - np.array([x0, y0, x0, y0]), first_edge=first.astype(np.int64),
+                            edge_of=edge[order].astype(np.int32))
 
 
 def _edges(polygons: shapely.Geometry) -> np.ndarray:

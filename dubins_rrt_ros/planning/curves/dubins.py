@@ -93,7 +93,8 @@ class DubinsCurve:
         """
         if not 0 <= s <= self.length:
             raise ValueError(f"s is {s} m; the curve is {self.length} m long, so give 0 to {self.length}")
-        return _kernel.pose_along(self.start, self.radius, self.index, self.lengths, s)
+        pose: Pose = _kernel.pose_along(self.start, self.radius, self.index, self.lengths, s)
+        return pose
 
     def poses(self, spacing: float) -> np.ndarray:
         """Return (n, 3) float64 poses at most `spacing` [m] apart, with both ends and the joints between the arcs.
@@ -147,22 +148,27 @@ def shortest(start: Pose, goal: Pose, radius: float) -> DubinsCurve:
         start, goal: (x [m], y [m], theta [rad]).
         radius: turning radius [m].
     """
-    word, *lengths = _kernel.shortest_curve(start, goal, radius)
-    return DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
+    return _curve(start, radius, *_kernel.shortest_curve(start, goal, radius))
 
 
 def candidates(start: Pose, goal: Pose, radius: float) -> dict[str, DubinsCurve]:
     """Return the curve of each word from `start` to `goal`, where there is one."""
-    return {WORDS[word]: DubinsCurve(tuple(start), radius, WORDS[word], tuple(lengths))
-            for word, *lengths in _kernel.all_curves(*start, *goal, radius)}
+    curves = (_curve(start, radius, *found) for found in _kernel.all_curves(start, goal, radius))
+    return {curve.word: curve for curve in curves}
+
+
+def _curve(start: Pose, radius: float, word: int, first: float, second: float, third: float) -> DubinsCurve:
+    x, y, theta = start
+    return DubinsCurve((x, y, theta), radius, WORDS[word], (first, second, third))
 
 
 def lengths(starts: np.ndarray, goals: np.ndarray, radius: float) -> np.ndarray:
     """Return the lengths [m] of the shortest curves between (..., 3) arrays of poses, broadcast against each other."""
     shape = np.broadcast_shapes(np.shape(starts), np.shape(goals))
-    both = (np.broadcast_to(np.asarray(poses, dtype=float), shape).reshape(-1, 3) for poses in (starts, goals))
+    rows = [np.require(np.broadcast_to(np.asarray(poses, dtype=float), shape).reshape(-1, 3), requirements=["C", "W"])
+            for poses in (starts, goals)]
     out = np.empty(shape[:-1])
-    _kernel.shortest_lengths(*(np.require(poses, requirements="CW") for poses in both), radius, out.reshape(-1))
+    _kernel.shortest_lengths(rows[0], rows[1], radius, out.reshape(-1))
     return out
 
 

@@ -51,8 +51,9 @@ def widest_passage(problem: Problem, field: ClearanceField) -> Passage | None:
         return None
     is_target = np.zeros(grid.rows * grid.columns, np.int8)
     is_target[targets] = 1
-    search = WidestPathSearch(field.kernel, grid.first, grid.step_along, (grid.rows, grid.columns), is_target, grid.spacing / 2,
-                              problem.vehicle.inscribed_radius + CLEARANCE_MARGIN + grid.spacing)
+    search = WidestPathSearch(clearance=field.kernel, first=grid.first, along=grid.step_along, shape=(grid.rows, grid.columns),
+                              is_target=is_target, least=grid.spacing / 2,
+                              enough=problem.vehicle.inscribed_radius + CLEARANCE_MARGIN + grid.spacing)
     _, nodes = search.widest_path(int(starts[np.argmax(field.at(grid.points(starts)))]))
     if len(nodes) == 0:
         return None

@@ -16,4 +16,4 @@ class MapNotFound(MapError):
 
 
 class MapMetadataError(MapError):
-    """What describes a grid, and not its cells, that cannot be used: its YAML, its resolution, its origin."""
+    """An error in the description of a grid, not in its cells: in its YAML, resolution or origin."""

@@ -95,12 +95,12 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
 
 
 def _located(path: Path, error: MapError) -> MapError:
-    """The error, of its own kind, with the file's name."""
+    """Return the error, of the same class, with the file's name in front."""
     return type(error)(f"{path}: {error}")
 
 
 def expand_home(path: str | os.PathLike[str]) -> Path:
-    """A path, its leading `~` replaced by the home directory."""
+    """Return a path with a leading `~` replaced by the home directory."""
     try:
         return Path(os.path.expanduser(path))
     except ValueError:  # a home directory of nobody that there can be
@@ -140,7 +140,7 @@ def _open(path: Path) -> BinaryIO:
 
 
 def _read_text(path: Path, max_bytes: int, refusal: type[MapError] = MapError) -> str:
-    """The text of a file; what is no text raises a `refusal`."""
+    """Return the text of a file; raise a `refusal` if it is too large, empty or not UTF-8."""
     with _open(path) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:

@@ -24,25 +24,25 @@ _PGM_HEADER = re.compile(rb"P([25])" + 3 * (_GAP + rb"+(\d{1,9})") + _GAP)
 _PNG_START = struct.Struct(">8sI4sIIBBBBB")
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
-#: The chunks that say what the pixels are. Pillow gets no others, as it warns of and fails for some that do not matter.
+#: Chunks that define the pixels. Pillow gets no others, since it warns of some that do not matter, or fails.
 _PNG_CHUNKS = (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND")
 _BMP_START = struct.Struct("<14xI12xI")
-#: The header that tells of no compression, the longest there is [bytes], and the compressions that are none.
+#: Length of the header without a compression field, maximum length of a header [bytes], and the codes of no compression.
 _BMP_SHORT_HEADER, _BMP_LONGEST_HEADER, _BMP_PLAIN = 12, 124, (0, 3)
 #: First column, first row and the steps from there, for each pass of an interlaced PNG.
 _PNG_PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
-#: What Pillow raises for damaged files.
+#: Exceptions that Pillow raises for damaged files.
 _PILLOW_ERRORS = (OSError, SyntaxError, ValueError, TypeError, LookupError, OverflowError, EOFError, struct.error)
 
 
 def read_image(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """The brightness and the transparency of an image.
+    """Return the brightness and the transparency of an image.
 
     As for map_server, brightness has 8 bits: 16 bits are rounded, colours weighted by Rec. 601.
 
     Args:
         file: a PGM (P2, P5), PNG or BMP, recognised by its content; at its start.
-        max_cells: the most pixels that are read; judged by the header, before the pixels are.
+        max_cells: maximum number of pixels, checked by the header before any are read.
 
     Returns:
         (height, width) uint8 brightness, the top row first, and (height, width) bool, true where a pixel is not fully
@@ -136,9 +136,9 @@ def _damaged(reason: object) -> MapError:
 
 
 def _png_chunks(file: BinaryIO, most: int) -> Iterator[bytes]:
-    """The chunks about pixels, whole, after a check of their checksums, which Pillow omits for the pixels.
+    """Yield the chunks about pixels, after a check of their checksums, which Pillow omits for pixels.
 
-    They may take `most` bytes, with 12 for each of the others.
+    They may take `most` bytes, each other chunk counted as 12.
     """
     end = file.seek(0, io.SEEK_END)
     at, kind = len(_PNG_SIGNATURE), b""
@@ -160,7 +160,7 @@ def _png_chunks(file: BinaryIO, most: int) -> Iterator[bytes]:
 
 
 def _png_bytes(width: int, height: int, bits: int, interlaced: int) -> int:
-    """The bytes of all rows: in every pass each row has a byte for its filter before its pixels of `bits`."""
+    """Return the number of bytes of all rows: in each pass a row has a byte for its filter, then its pixels of `bits`."""
     total = 0
     for x, y, dx, dy in _PNG_PASSES if interlaced else ((0, 0, 1, 1),):
         columns, rows = -((x - width) // dx), -((y - height) // dy)
@@ -170,7 +170,7 @@ def _png_bytes(width: int, height: int, bits: int, interlaced: int) -> int:
 
 
 def _inflated_bytes(parts: Iterable[bytes], enough: int) -> int:
-    """How many bytes a compressed stream gives; counts no further than `enough`, in small pieces."""
+    """Return the number of bytes that a compressed stream inflates to, counted up to `enough`, in small pieces."""
     inflate = zlib.decompressobj()
     count = 0
     try:

@@ -1,4 +1,4 @@
-"""Where maps are, whichever way the package was installed."""
+"""The search for map files: by path, by URL, or by the name of a map of the package, however that was installed."""
 
 import os
 import re
@@ -21,7 +21,7 @@ def ament_prefixes() -> list[Path]:
 
 
 def _share_folders(package: str) -> list[Path]:
-    """Where a package's shared files may be: with colcon or apt; our own also with pip, or in the source tree."""
+    """List the folders where a package's shared files may be: of colcon or apt; for our own also of pip and the source tree."""
     folders = [prefix / "share" / package for prefix in ament_prefixes()]
     if package == PACKAGE:
         folder = Path(__file__).resolve().parents[2]
@@ -32,7 +32,7 @@ def _share_folders(package: str) -> list[Path]:
 
 
 def maps_directory() -> Path:
-    """The folder of the package's own maps: in the share folder (of colcon or apt, then of pip), or in the source tree."""
+    """Return the folder of the package's own maps: in the share folder (of colcon or apt, then of pip), or the source tree."""
     folders = [folder / "maps" for folder in _share_folders(PACKAGE)]
     return next((folder for folder in folders if folder.is_dir()), folders[-1])
 
@@ -43,7 +43,7 @@ def installed_maps() -> list[Path]:
 
 
 def find_map(name: str) -> Path:
-    """The file of a map.
+    """Return the file of a map.
 
     Args:
         name: a path, where a leading `~` is the home directory; the name of one of the package's own maps, with or
@@ -69,7 +69,7 @@ def _choices() -> str:
 
 
 def _places(name: str) -> list[Path]:
-    """Where the map of a name that is no URL may be."""
+    """List the files that a name which is no URL may stand for."""
     path, own = expand_home(name), maps_directory()
     is_own = path.parent in (Path("."), Path("maps"))
     return [path, own / path.name, own / f"{path.name}{OMITTED_ENDING}"] if is_own else [path]

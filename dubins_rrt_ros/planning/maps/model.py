@@ -231,9 +231,13 @@ def _digest(*parts: bytes) -> str:
 
 
 def rasterise(polygons: PolygonMap, resolution: float) -> GridMap:
-    """The grid of a polygon map, with one ring of occupied cells around it.
+    """Return the grid of a polygon map, with one ring of occupied cells around it.
 
     A cell is occupied where its open square meets an obstacle, so that what is free in the grid is free in the polygons.
+
+    Args:
+        polygons: the map.
+        resolution: the side of a cell [m].
     """
     x0, y0, x1, y1 = shapely.bounds(polygons.free)
     columns, rows = (math.ceil(side / resolution - 1e-9) + 2 for side in (x1 - x0, y1 - y0))

@@ -5,26 +5,26 @@ from typing import Any
 
 import yaml
 
-#: How many brackets may be open at once: PyYAML takes seconds for a line of a thousand.
+#: Maximum number of brackets open at once: PyYAML takes seconds for a line of a thousand.
 DEEPEST = 50
 
 
 def load_plain(text: str, *, aliases: bool) -> Any:
-    """What a YAML document holds, in dicts, lists and texts.
+    """Return the contents of a YAML document as dicts, lists and texts.
 
     YAML 1.1 would make 1e-2 text, 010 eight, an image named 2024 a number, and a mode named off a boolean.
 
     Args:
         text: the document.
-        aliases: whether it may have any; a few lines of them can stand for billions of values, which take no memory, but time
-            to go through.
+        aliases: True if aliases are allowed; a few lines of them can stand for billions of values, which take time to go
+            through.
 
     Raises:
-        yaml.YAMLError: it is no valid YAML, or has an alias where none may be.
+        yaml.YAMLError: it is not valid YAML, or has an alias although none is allowed.
         RecursionError: it is nested too deep.
-        ValueError, OverflowError: it has a character that there is not.
+        ValueError, OverflowError: it has an escape of a character that does not exist.
     """
-    # Those in quotes and comments count too: it is not worth telling them apart.
+    # Brackets in quotes and comments count too; telling them apart is not worth it.
     if max(accumulate((letter in "[{") - (letter in "]}") for letter in text), default=0) > DEEPEST:
         raise RecursionError
     return yaml.load(text, Loader=yaml.BaseLoader if aliases else _Loader)

@@ -1,4 +1,4 @@
-"""What edges and paths cost: what `_kernels/edge_cost.py` states, for arrays."""
+"""The costs of edges and paths as arrays; `_kernels/edge_cost.py` states them for the kernels."""
 
 import numpy as np
 

@@ -34,7 +34,8 @@ class CostToGo:
         """
         cells, squares = field.free_squares(required_clearance)
         self._field, self._free = field, squares
-        self.kernel = CostToGoKernel(field.kernel, cells, squares, source, tolerance, target)
+        self.kernel = CostToGoKernel(clearance=field.kernel, block=cells, free=squares, source=source, tolerance=tolerance,
+                                     target=target)
 
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "CostToGo":

@@ -78,7 +78,7 @@ class Search:
         self.samples = 0
         self.best = -1
         self._problem, self._settings = problem, settings
-        self._tree = SearchTree(problem.start, vehicle.turning_radius, lowest, extent)
+        self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
         self._kernel = RrtKernel(
             tree=self._tree, checker=field.collision_checker(vehicle), step=settings.step_size, near_factor=NEAR_FACTOR,
             max_near=MOST_NEAR, goal=problem.goal, tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
