@@ -10,8 +10,8 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from dubins_rrt_ros.planning.maps.files import MAP_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, maps_directory
+from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
 
 from .commands import COMMANDS, load_arguments
 from .common.parser import Parser, describe

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 from dubins_rrt_ros.planning import PolygonMap, load_map, rasterise, save_map
-from dubins_rrt_ros.planning.maps.files import POLYGON_ENDINGS
+from dubins_rrt_ros.planning.maps.readers import POLYGON_ENDINGS
 
 from .common.example import ENDS, MAP
 from .common.output import check_folder, words_for, write_document

@@ -8,7 +8,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
-from dubins_rrt_ros.planning.maps.files import MAX_MAP_CELLS
+from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 
 

@@ -22,7 +22,8 @@ from .curves.dubins import WORDS, CurveError, DubinsCurve
 from .curves.path import Path, PathError
 from .errors import PlanningError
 from .maps.errors import MapError, MapMetadataError, MapNotFound
-from .maps.files import load_map, save_map
+from .maps.files import load_map
+from .maps.grids import save_map
 from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, rasterise
 from .option import OptionError, options, values
 from .planner import plan

@@ -10,7 +10,8 @@ from PIL import Image
 from support.images import pgm
 
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
-from dubins_rrt_ros.planning.maps.files import load_map, save_map
+from dubins_rrt_ros.planning.maps.files import load_map
+from dubins_rrt_ros.planning.maps.grids import save_map
 from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, rasterise
 from dubins_rrt_ros.planning.text import LONGEST
 
@@ -138,6 +139,24 @@ def test_polygons_by_their_ending(tmp_path, ending):
     yard = load_map(path)
     assert isinstance(yard, PolygonMap)
     assert (yard.name, yard.free.area) == (path.name, 4)
+
+
+@pytest.mark.parametrize("name", ["maze", "maze.yaml", "maps/maze.yaml", "block.geojson", Path("maze")])
+def test_own_maps_by_name(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    assert load_map(name).id == load_map(MAPS / Path(name if Path(name).suffix else f"{name}.yaml").name).id
+    (tmp_path / "maze").mkdir()
+    write_grid(tmp_path).rename(tmp_path / "maze.yaml")
+    assert load_map("maze.yaml").data.shape == (1, 3)
+
+
+def test_an_image_that_cannot_be_read_is_refused(tmp_path):
+    path = image_named(tmp_path, "/proc/self/mem")
+    with pytest.raises(MapError, match=r"m.yaml: image '/proc/self/mem' cannot be read \(.*\); give a regular file"):
+        load_map(path)
+    (tmp_path / "mem.wkt").symlink_to("/proc/self/mem")
+    with pytest.raises(MapError, match="mem.wkt: cannot be read"):
+        load_map(tmp_path / "mem.wkt")
 
 
 NO_FILES = ["no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', '"' + 300 * "n" + '"']
@@ -294,7 +313,7 @@ def test_messages_of_long_and_deep_values_are_short(tmp_path):
 
 
 def test_long_polygon_files_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.maps.files.MAX_POLYGON_BYTES", 50)
+    monkeypatch.setattr("dubins_rrt_ros.planning.maps.readers.MAX_POLYGON_BYTES", 50)
     (tmp_path / "m.geojson").write_text(" " * 51)
     assert "larger than 50 bytes" in refusal(tmp_path / "m.geojson")
 

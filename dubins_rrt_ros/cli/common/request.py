@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
-from dubins_rrt_ros.planning.maps.files import MAP_ENDINGS, MAX_MAP_CELLS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
+from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
+from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
 
 from .documents import read_json

@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from dubins_rrt_ros.node.conversions import grid_from, pose_from, pose_message
 from dubins_rrt_ros.planning import GridMap
-from dubins_rrt_ros.planning.maps.files import MAX_MAP_CELLS
+from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.problem import Pose
 
 from .process import DemoError

@@ -7,7 +7,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from .errors import MapNotFound
-from .files import MAP_ENDINGS, expand_home
+from .opening import expand_home
+from .readers import MAP_ENDINGS
 
 PACKAGE = "dubins_rrt_ros"
 #: The ending that the name of an installed map may leave out.
@@ -62,13 +63,18 @@ def find_map(name: str) -> Path:
     return path
 
 
+def find_own(path: str | os.PathLike[str]) -> Path:
+    """Return a path, its leading `~` replaced; or one of the package's own maps, where it alone has that name."""
+    return next(filter(os.path.isfile, _places(path)), expand_home(path))
+
+
 def _choices() -> str:
     own = [file.name for file in installed_maps()]
     return ("a path, a file:// or package:// URL, or one of the package's own maps: "
             f"{', '.join(own) or 'none are installed'}")
 
 
-def _places(name: str) -> list[Path]:
+def _places(name: str | os.PathLike[str]) -> list[Path]:
     """List the files that a name which is no URL may stand for."""
     path, own = expand_home(name), maps_directory()
     is_own = path.parent in (Path("."), Path("maps"))

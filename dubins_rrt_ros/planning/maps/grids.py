@@ -1,0 +1,171 @@
+"""Read and write grids as map_server does: a YAML file, and the image that it names."""
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from ..text import quoted
+from .errors import MapError, MapMetadataError
+from .images import read_image
+from .model import (
+    FREE,
+    FREE_UP_TO,
+    OCCUPIED,
+    OCCUPIED_FROM,
+    UNKNOWN,
+    GridMap,
+)
+from .opening import ReadOptions, check_inside, located, opened, read_text
+from .yaml import load_plain
+
+#: Longest YAML file that is read [bytes].
+MAX_YAML_BYTES = 16 * 2**10
+
+MODES = ("trinary", "scale", "raw")
+_FLAGS = {**dict.fromkeys(("0", "false", "no", "off"), False), **dict.fromkeys(("1", "true", "yes", "on"), True)}
+#: The brightness that trinary files have for free, occupied and unknown cells, and the thresholds that tell them apart.
+_FREE_GREY, _OCCUPIED_GREY, _UNKNOWN_GREY = 254, 0, 205
+_SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
+
+
+def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
+    """Write a grid as a map_server pair: the YAML file, and a binary PGM of the same name beside it.
+
+    The mode is trinary: cells up to 25 become free, from 65 on occupied, all others unknown.
+
+    Raises:
+        MapError: the name has another ending, or a file cannot be written.
+    """
+    path = Path(yaml_path)
+    image = path.with_suffix(".pgm")
+    fields = {"image": image.name, "mode": "trinary", "resolution": grid.resolution, "origin": list(grid.origin),
+              "negate": 0, "occupied_thresh": _SAVED_OCCUPIED_THRESH, "free_thresh": _SAVED_FREE_THRESH}
+    grey = np.full(grid.data.shape, _UNKNOWN_GREY, np.uint8)
+    grey[(grid.data >= 0) & (grid.data <= FREE_UP_TO)] = _FREE_GREY
+    grey[grid.data >= OCCUPIED_FROM] = _OCCUPIED_GREY
+    height, width = grid.data.shape
+    try:
+        if path.suffix not in (".yaml", ".yml"):
+            raise MapError(f"the ending {path.suffix!r} is not a map_server file's; name it .yaml")
+        image.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
+        path.write_text(yaml.safe_dump(fields, sort_keys=False, default_flow_style=None, allow_unicode=True), "utf-8")
+    except OSError as error:
+        raise MapError(f"{path}: cannot be written ({error.strerror}); choose a directory that is writable") from None
+    except MapError as error:
+        raise located(path, error) from None
+
+
+def load_grid(path: Path, options: ReadOptions) -> GridMap:
+    """Load a map_server map by its YAML file.
+
+    Raises:
+        MapError: see :func:`~dubins_rrt_ros.planning.maps.files.load_map`.
+    """
+    fields = _parse_yaml(read_text(path, MAX_YAML_BYTES, MapMetadataError))
+    image = _field(fields, "image", _text, "give the name of a PGM, PNG or BMP file")
+    resolution = _field(fields, "resolution", _positive, "give the side of a cell in metres, above 0")
+    origin = _field(fields, "origin", _pose, "give [x, y, yaw], three finite numbers in metres and radians")
+    negate = _field(fields, "negate", lambda value: _FLAGS[value.lower()], "give 0 or 1")
+    occupied = _field(fields, "occupied_thresh", _fraction, "give a number from 0 to 1")
+    free = _field(fields, "free_thresh", _fraction, "give a number from 0 to 1")
+    mode = _field({"mode": "trinary", **fields}, "mode", _mode, f"give one of {', '.join(MODES)}")
+    if free >= occupied:
+        raise MapMetadataError(f"free_thresh is {free} and occupied_thresh {occupied}; make free_thresh the smaller one")
+    try:
+        check_inside(path.parent / image, options.directory)
+        with opened(path.parent / image) as file:
+            grey, transparent = read_image(file, options.max_map_cells)
+    except MapError as error:
+        raise type(error)(f"image {image!r} {error}") from None
+    # Row 0 of an image is the top, of a grid the bottom.
+    data = _cell_values(mode, negate, occupied, free)[grey[::-1]]
+    if transparent is not None and mode != "raw":
+        data[transparent[::-1]] = UNKNOWN
+    return GridMap(data, resolution, origin, path.name, percent=True)
+
+
+def _parse_yaml(text: str) -> dict[str, Any]:
+    try:
+        document = load_plain(text, aliases=True)  # as map_server's parser does it
+    except RecursionError:
+        raise MapMetadataError("YAML is nested too deep; give the fields of a map_server map") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise MapMetadataError(f"is no valid YAML ({error}); correct the text") from None
+    if not isinstance(document, dict):
+        raise MapMetadataError(f"YAML is {quoted(document)}; give the fields of a map_server map")
+    return document
+
+
+def _field(fields: dict[str, Any], name: str, convert: Callable[[Any], Any], remedy: str) -> Any:
+    if name not in fields:
+        raise MapMetadataError(f"{name} is missing; {remedy}")
+    try:
+        return convert(fields[name])
+    except (ValueError, TypeError, LookupError, AttributeError):
+        raise MapMetadataError(f"{name} is {quoted(fields[name])}; {remedy}") from None
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    if not value:
+        raise ValueError
+    return value
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _positive(value: Any) -> float:
+    number = _finite(value)
+    if number <= 0:
+        raise ValueError
+    return number
+
+
+def _fraction(value: Any) -> float:
+    number = _finite(value)
+    if not 0 <= number <= 1:
+        raise ValueError
+    return number
+
+
+def _pose(value: Any) -> tuple[float, float, float]:
+    if not isinstance(value, list):
+        raise TypeError
+    x, y, yaw = map(_finite, value)
+    return x, y, yaw
+
+
+def _mode(value: Any) -> str:
+    return MODES[MODES.index(value.lower())]
+
+
+def _cell_values(mode: str, negate: bool, occupied: float, free: float) -> np.ndarray:
+    """(256,) int8: the cell that each brightness stands for.
+
+    Jazzy compares in single precision, both thresholds inclusive, and rounds halves away from zero; raw knows neither
+    `negate` nor thresholds.
+    """
+    grey = np.arange(256)
+    if mode == "raw":
+        return np.where(grey <= OCCUPIED, grey, UNKNOWN).astype(np.int8)
+    shade = grey.astype(np.float32) / np.float32(255)
+    occupancy = shade if negate else np.float32(1) - shade
+    between: np.ndarray | int = UNKNOWN
+    if mode == "scale":
+        scaled = (occupancy - np.float32(free)) / np.float32(occupied - free) * np.float32(100)
+        between = np.floor(scaled.astype(float) + 0.5)
+    values = np.where(occupancy >= np.float32(occupied), OCCUPIED, between)
+    return np.where(occupancy <= np.float32(free), FREE, values).astype(np.int8)
+
+
