@@ -13,7 +13,8 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Header
 
-from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, rasterise
+from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, Thresholds, rasterise
+from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 from dubins_rrt_ros.planning.problem import Pose
 
 #: Minimum norm of a quaternion that is taken, and the deviation from 1 beyond which it is doubtful.
@@ -125,13 +126,14 @@ def _fill(message: PoseMessage, x: float, y: float, z: float, w: float) -> None:
     message.orientation.z, message.orientation.w = z, w
 
 
-def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap:
+def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> GridMap:
     """Return the map of a message.
 
     Args:
         message: an occupancy grid.
         frame: the global frame.
         max_map_cells: maximum number of cells.
+        thresholds: which values are free, and which occupied.
 
     Raises:
         MapError: it is in another frame, has no cells or too many, or its fields contradict each other.
@@ -155,7 +157,8 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int) -> GridMap
     data = np.frombuffer(message.data, dtype=np.int8).reshape(info.height, info.width)
     # The field is a float32; the decimal it stands for gives the same map as the file that was published.
     resolution = float(str(np.float32(info.resolution)))
-    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name, percent=True)
+    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name, percent=True,
+                   thresholds=thresholds)
 
 
 def grid_message(grid: GridMap, frame: str, stamp: Time) -> OccupancyGrid:

@@ -9,6 +9,7 @@ from typing import Any
 from nav_msgs.msg import OccupancyGrid
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from dubins_rrt_ros.planning import GridMap, Map, MapError, Vehicle, World, load_map, prepare
 from dubins_rrt_ros.planning.collision.footprint import summary
@@ -54,6 +55,7 @@ class Maps:
         self.map: Map | None = None
         self.grid: GridMap | None = None
         self.refusal = ""
+        self._came_by_topic = False
         self._worker = Worker("maps")
         self._world: futures.Future[World] = futures.Future()  # of the newest map
         self._world_is_of: tuple[Map, float, bool] | None = None  # map, inscribed radius and allow_unknown
@@ -65,6 +67,7 @@ class Maps:
         else:
             qos = LATCHED if self._options.map_transient_local else VOLATILE
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
+        node.add_post_set_parameters_callback(self._on_parameters)
 
     @property
     def _options(self) -> NodeOptions:
@@ -127,9 +130,10 @@ class Maps:
 
     # Maps
 
-    def take(self, world_map: Map, grid: GridMap) -> None:
+    def take(self, world_map: Map, grid: GridMap, by_topic: bool = False) -> None:
         """Plan on this map, which looks like this grid, from now on."""
         self.map, self.grid, self.refusal = world_map, grid, ""
+        self._came_by_topic = by_topic
         height, width = grid.data.shape
         self._node.get_logger().info(f"Took a map of {width} x {height} cells: {world_map.name}")
         self._newest_world()
@@ -163,11 +167,18 @@ class Maps:
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
-            grid = grid_from(message, self._frame, self._options.max_map_cells)
+            grid = grid_from(message, self._frame, self._options.max_map_cells, self._options.thresholds)
         except MapError as error:
             self.refuse(error)
         else:
-            self.take(grid, grid)
+            self.take(grid, grid, by_topic=True)
+
+    def _on_parameters(self, changes: list[Parameter]) -> None:
+        """Take the map that came by topic by other thresholds, where these changed."""
+        thresholds = self._options.thresholds
+        if self._came_by_topic and self.grid is not None and self.grid.thresholds != thresholds:
+            grid = self.grid.with_thresholds(thresholds)
+            self.take(grid, grid, by_topic=True)
 
     def _load_first(self, name: str) -> Loaded:
         """Load the map that the node begins with; a signal ends the wait for it."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 
-from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
+from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, Vehicle, options
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 
@@ -26,6 +26,10 @@ class NodeOptions:
     global_frame: str = option("map", "frame of map, poses and path")
     map_transient_local: bool = option(True, "subscribe to the map as transient local, as map_server publishes it")
     max_map_cells: int = option(MAX_MAP_CELLS, "maximum size of a map", unit="cells", low=1, high=2**31 - 1)
+    occupied_thresh: float = option(0.65, "cells of a grid by topic are occupied from this share on, as in map_server's files; "
+                                          "those between the two thresholds are unknown", low=0.0, high=1.0)
+    free_thresh: float = option(0.25, "cells of a grid by topic are free up to this share; a map of probabilities may need more, "
+                                      "such as 0.49", low=0.0, high=1.0)
     publish_tree: bool = option(True, "publish the tree on ~/tree while somebody subscribes")
     replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
                                                "is no longer free")
@@ -36,6 +40,14 @@ class NodeOptions:
         convert_options(self)
         if not self.global_frame:
             raise OptionError("global_frame is ''; give the name of a frame, such as map")
+        if self.free_thresh >= self.occupied_thresh:
+            raise OptionError(f"free_thresh is {self.free_thresh:g} and occupied_thresh {self.occupied_thresh:g}; make "
+                              "free_thresh the smaller one")
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """What the values of cells mean in grids by topic."""
+        return Thresholds.of_fractions(self.free_thresh, self.occupied_thresh)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from .errors import PlanningError
 from .maps.errors import MapError, MapMetadataError, MapNotFound
 from .maps.files import load_map
 from .maps.grids import save_map
-from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, rasterise
+from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, Thresholds, rasterise
 from .option import OptionError, options, values
 from .planner import plan
 from .problem import InvalidPose, Pose, Problem, checked_pose
@@ -40,7 +40,7 @@ __all__ = [  # noqa: RUF022 - by what a user needs, in this order
     # what comes of it
     "Plan", "Progress", "Status", "Path", "DubinsCurve", "Tree", "Audit", "audit_path",
     # maps
-    "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "rasterise", "save_map",
+    "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "Thresholds", "rasterise", "save_map",
     # errors
     "PlanningError", "CurveError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "PathError",
     "PlanError", "TreeError",

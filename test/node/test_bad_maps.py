@@ -17,10 +17,11 @@ from std_srvs.srv import Trigger
 from support.harness import Conversation, assert_says
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
-from dubins_rrt_ros.planning import OCCUPIED, GridMap
+from dubins_rrt_ros.planning import OCCUPIED, GridMap, Thresholds
 
 #: On a map of 10 m x 10 m with a box of 2 m in its middle.
 START, GOAL = (1.5, 5.0, 0.0), (8.5, 5.0, 0.5)
+IN_THE_BOX = (5.05, 5.05, 0.0)
 QUICK = {"planner": "rrt", "samples": 3000, "planning_time": 15.0, "seed": 1}
 NAN, INF = math.nan, math.inf
 
@@ -133,6 +134,26 @@ def test_cells_of_any_value_are_free_only_where_they_say_so(on_other_maps, value
     data[:, 60:] = value
     take(on_other_maps, changed(data=array.array("b", data.tobytes())))
     assert on_other_maps.plan(START, GOAL)[0]["error_name"] == name
+
+
+def test_probabilities_are_free_and_occupied_by_thresholds_that_can_be_set(on_other_maps):
+    """Free cells of 5 to 34 %, as cartographer publishes them."""
+    client = on_other_maps.client
+    data = np.random.default_rng(1).integers(5, 35, (100, 100)).astype(np.int8)
+    data[40:60, 40:60], data[50, 15], data[0, 0] = 70, 29, 100
+    take(on_other_maps, changed(data=array.array("b", data.tobytes())))
+    assert_says(on_other_maps.plan((1.55, 5.05, 0.0), GOAL)[0], "205", "START_OCCUPIED",
+                "(1.55, 5.05) lies in unknown space, a cell of 29 % (free is up to 25 %, occupied from 65 % on)",
+                "set free_thresh to 0.29 or above")
+    assert client.set_parameters(free_thresh=0.35).successful
+    told, _ = on_other_maps.plan((1.55, 5.05, 0.0), GOAL)
+    assert (told["error_name"], told["map_id"]) == ("NONE", GridMap(data, 0.1, thresholds=Thresholds(free_up_to=35)).id)
+    assert_says(on_other_maps.plan(IN_THE_BOX, GOAL)[0], "205", "START_OCCUPIED", "lies in an obstacle, a cell of 70 %")
+    assert client.set_parameters(occupied_thresh=0.71).successful
+    assert_says(on_other_maps.plan(IN_THE_BOX, GOAL)[0], "205", "START_OCCUPIED", "unknown space, a cell of 70 %", "from 71 %")
+    refused = client.set_parameters(occupied_thresh=0.35)
+    assert not refused.successful and "make free_thresh the smaller one" in refused.reason
+    assert client.set_parameters(occupied_thresh=0.65, free_thresh=0.25).successful
 
 
 @pytest.mark.parametrize("message", [changed(width=1, height=1, data=cells(1)), changed(data=array.array("b", [100] * 10_000)),

@@ -40,6 +40,8 @@ PARAMETERS = {
     "any_goal_heading": (BOOL, None, "no"),
     "path_spacing": (DOUBLE, None, 0.0),
     "seed": (INTEGER, -1, -2),
+    "occupied_thresh": (DOUBLE, 0.65, 1.5),
+    "free_thresh": (DOUBLE, 0.25, -0.1),
     "publish_tree": (BOOL, None, "no"),
     "replan_on_map_change": (BOOL, None, "no"),
     "map_transient_local": (BOOL, None, "no"),

@@ -14,7 +14,7 @@ from dubins_rrt_ros.planning import DubinsCurve, GridMap, Path, PolygonMap, Prob
 from dubins_rrt_ros.planning.audit import obstacles as audit_obstacles
 from dubins_rrt_ros.planning.audit import sweep as audit_sweep
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.maps.model import blocked_cells
+from dubins_rrt_ros.planning.maps.model import Thresholds
 
 CAR = [(3.6, 0.9), (-0.9, 0.9), (-0.9, -0.9), (3.6, -0.9)]
 #: An L: its front right quarter is missing.
@@ -257,8 +257,8 @@ def test_of_a_large_grid_only_what_is_near_is_read(monkeypatch):
     data = np.where(rng.random((4000, 4000)) < 0.1, 100, 0).astype(np.int8)
     data[1960:2040] = 0
     map, read = GridMap(data, 0.05), []
-    monkeypatch.setattr("dubins_rrt_ros.planning.audit.obstacles.blocked_cells",
-                        lambda part, unknown: read.append(part.size) or blocked_cells(part, unknown))
+    blocked = Thresholds.blocked
+    monkeypatch.setattr(Thresholds, "blocked", lambda self, part, unknown: read.append(part.size) or blocked(self, part, unknown))
     verdict = judged(map, vehicle_of(CAR), straight(20.0, 100.0, 0.0, 25.0))
     assert verdict.ok and verdict.min_clearance == pytest.approx(2.0 - 0.9, rel=0.02)
     assert 0 < sum(read) < 300_000

@@ -17,6 +17,7 @@ from dubins_rrt_ros.planning import (
     Problem,
     Settings,
     Status,
+    Thresholds,
     Vehicle,
     kernels_compiled,
     plan,
@@ -190,7 +191,7 @@ def test_the_nearest_obstacle_is_the_nearest(make):
     for _ in range(200):
         point = tuple((corners[0] + rng.random(2) @ (corners[[1, 3]] - corners[0])).tolist())
         clearance = float(field.at(np.array(point)))
-        found, what = nearest_obstacle(map, False, point, clearance)
+        found, what, _ = nearest_obstacle(map, False, point, clearance)
         assert math.dist(found, point) == pytest.approx(clearance, abs=1e-9)
         if clearance > 0:
             assert shapely.boundary(free).distance(shapely.Point(found)) < 1e-9
@@ -224,6 +225,27 @@ def test_an_occupied_pose_between_unknown_and_occupied_cells():
     data[:, 22] = 0
     inside = replace(problem, map=GridMap(data, 0.5, (-10.0, -10.0, 0.0)), start=(0.3, 0.0, 0.0))
     assert "clearance 0.00 m, needed 0.25 m; (0.30, 0.00) lies in unknown space: drive there to map it" in why(inside).message
+
+
+def test_an_occupied_pose_in_a_cell_that_is_neither_free_nor_occupied():
+    data = np.zeros((40, 40), np.int8)
+    data[:, 20], data[0, 0] = 29, 100
+    problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), Vehicle(0.5, 0.25), (0.3, 0.0, 0.0), GOAL)
+    assert why(problem).message.endswith("(0.30, 0.00) lies in unknown space, a cell of 29 % (free is up to 25 %, occupied from "
+                                         "65 % on): if that is free, set free_thresh to 0.29 or above, or allow_unknown.")
+    footprint = replace(problem, vehicle=Vehicle(0.5, footprint=[(0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)]),
+                        start=(0.75, 0.0, 0.0))
+    assert "touches unknown space, a cell of 29 %" in why(footprint).message
+    thresholds = Thresholds.of_fractions(free_thresh=0.29, occupied_thresh=0.3)
+    assert (thresholds.free_up_to, thresholds.occupied_from) == (29, 30)
+    assert plan(replace(problem, map=problem.map.with_thresholds(thresholds)), Settings(planner="rrt", seed=1)).solved
+
+
+def test_a_wall_of_cells_that_are_neither_free_nor_occupied_is_named_with_their_value():
+    data = np.zeros((40, 40), np.int8)
+    data[:, 20], data[0, 0] = 64, 100
+    problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), Vehicle(0.5, 0.25), START, GOAL)
+    assert re.search(r"begins at \(.*\) with a cell of 64 %; if that is free, set free_thresh to 0.64", why(problem).message)
 
 
 def test_the_figures_of_an_occupied_goal_with_a_tolerance():

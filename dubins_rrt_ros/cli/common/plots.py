@@ -17,7 +17,6 @@ from matplotlib.path import Path as Contour
 from matplotlib.transforms import Affine2D
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Vehicle
-from dubins_rrt_ros.planning.maps.model import OCCUPIED_FROM
 
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
@@ -172,7 +171,7 @@ def draw_map(axes: Axes, world_map: Map, free: str = FREE) -> None:
 
 
 def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
-    classes = np.where(grid.data >= OCCUPIED_FROM, 2, grid.blocked(allow_unknown=False).astype(int))
+    classes = np.where(grid.blocked(allow_unknown=True), 2, grid.blocked(allow_unknown=False).astype(int))
     colours = np.array([list(bytes.fromhex(colour[1:])) for colour in (free, UNKNOWN, OBSTACLE)], dtype=np.uint8)
     x, y, yaw = grid.origin
     view = axes.axis()

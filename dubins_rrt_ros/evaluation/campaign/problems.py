@@ -10,7 +10,7 @@ import shapely
 
 from dubins_rrt_ros.planning import FREE, OCCUPIED, UNKNOWN, GridMap, Map, Pose, Problem, Settings, Vehicle
 from dubins_rrt_ros.planning.audit.edges import clearances, pose_gaps
-from dubins_rrt_ros.planning.maps.model import FREE_UP_TO
+from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 
 from .maps import MAPS, log_uniform, placed, random_origin
 
@@ -132,7 +132,8 @@ def _gap(rng: np.random.Generator) -> Trial:
     sides = 2 * (away + 1.2 * size), 2 * rng.uniform(1.2, 3) * size + width
     world_map: Map
     if kind == "grid":
-        world_map = _gap_grid(width, cells, thick, sides, origin, wall=int(rng.choice([OCCUPIED, UNKNOWN, FREE_UP_TO + 1])))
+        wall = int(rng.choice([OCCUPIED, UNKNOWN, DEFAULT_THRESHOLDS.free_up_to + 1]))
+        world_map = _gap_grid(width, cells, thick, sides, origin, wall)
     else:
         world_map = _gap_polygons(width, thick, sides, origin)
     problem = Problem(world_map, vehicle, _at(origin, -away, 0.0, 0.0), _at(origin, away, 0.0, 0.0))

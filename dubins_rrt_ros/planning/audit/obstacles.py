@@ -8,7 +8,7 @@ import math
 import numpy as np
 import shapely
 
-from ..maps.model import GridMap, Map, blocked_cells
+from ..maps.model import GridMap, Map
 
 #: Number of cells around a point within which obstacles are sought at first.
 FIRST_REACH = 8
@@ -55,7 +55,7 @@ class GridObstacles:
 
     def __init__(self, grid: GridMap, allow_unknown: bool):
         self._data, self._resolution, self._origin = grid.data, grid.resolution, grid.origin
-        self._allow_unknown = allow_unknown
+        self._thresholds, self._allow_unknown = grid.thresholds, allow_unknown
         self._windows: dict[tuple[int, complex], _Window] = {}
 
     def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ class GridObstacles:
         """Return the cells of a square tile and those within the margin around it."""
         left, low = max(0, int(corner.real) - margin), max(0, int(corner.imag) - margin)
         part = self._data[low:int(corner.imag) + side + margin, left:int(corner.real) + side + margin]
-        return _Window(blocked_cells(part, self._allow_unknown), left, low)
+        return _Window(self._thresholds.blocked(part, self._allow_unknown), left, low)
 
 
 class _Window:
@@ -146,7 +146,7 @@ class PathsideSquares:
         self.reach = math.inf if near.all() else reach
         rectangles = [np.empty((0, 4), int)]
         for row, first, end in (BLOCK * _runs(near)).tolist():
-            part = blocked_cells(grid.data[row:row + BLOCK, first:end], allow_unknown)
+            part = grid.thresholds.blocked(grid.data[row:row + BLOCK, first:end], allow_unknown)
             rectangles.append(_rectangles(part) + np.array([first, row, first, row]))
         self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
 

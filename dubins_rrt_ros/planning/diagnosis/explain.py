@@ -8,7 +8,7 @@ import shapely
 
 from ..collision.clearance import ClearanceField
 from ..collision.raster import CLEARANCE_MARGIN
-from ..maps.model import GridMap
+from ..maps.model import OCCUPIED, UNKNOWN, GridMap
 from ..problem import Pose, Problem
 from ..result import Status
 from ..search.tree import Tree
@@ -20,6 +20,7 @@ from .obstacles import (
     OBSTACLE,
     ROUNDING,
     UNKNOWN_SPACE,
+    Obstacle,
     avoids_unknown,
     has_no_room,
     nearest_in_map,
@@ -119,7 +120,8 @@ def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, 
     """Return the sentence on a pose without room, and the nearest obstacle."""
     required = problem.vehicle.inscribed_radius + CLEARANCE_MARGIN
     clearance = float(field.at(np.array(point)))
-    nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, point, clearance)
+    obstacle = nearest_obstacle(problem.map, problem.allow_unknown, point, clearance)
+    nearest, what, _ = obstacle
     found, needed = distinct(clearance, required)
     message = f"{name} is occupied: clearance {found} m, needed {needed} m"
     if tolerance:
@@ -127,11 +129,12 @@ def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, 
     if isinstance(problem.map, GridMap) and what == UNKNOWN_SPACE:
         opened = ClearanceField(problem.map.window(point, 2 * (tolerance + required)), allow_unknown=True)
         if not has_no_room(opened, required, point, tolerance):
-            where = f"only unknown space is that near, at {at(nearest)}" if clearance > 0 else f"{at(point)} lies in {what}"
-            return f"{message}; {where}: drive there to map it, or set allow_unknown.", nearest
+            unknown = _in_words(problem, obstacle)
+            where = f"only {unknown} is that near, at {at(nearest)}" if clearance > 0 else f"{at(point)} lies in {unknown}"
+            return f"{message}; {where}: {_remedy_for_unknown(obstacle)}.", nearest
     if clearance == 0 and what != MAP_EDGE:
-        return f"{message}; {at(point)} lies in {'an obstacle' if what == OBSTACLE else what}; move it.", nearest
-    where = f"nearest obstacle {'' if what == OBSTACLE else f'is {what} '}at {at(nearest)}"
+        return f"{message}; {at(point)} lies in {_in_words(problem, obstacle)}; move it.", nearest
+    where = f"nearest obstacle {'' if what == OBSTACLE else f'is {_in_words(problem, obstacle)} '}at {at(nearest)}"
     return f"{message}; {where}; move it, or {_smaller(problem.vehicle)}.", nearest
 
 
@@ -140,15 +143,34 @@ def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose)
     points = _points_of(problem.vehicle, pose)
     clearance = field.at(points)
     worst = tuple(points[np.argmin(clearance)].tolist())
-    nearest, what = nearest_in_map(problem.map, worst), MAP_EDGE
-    if math.dist(nearest, worst) <= ROUNDING:
-        nearest, what = nearest_obstacle(problem.map, problem.allow_unknown, worst, float(clearance.min()))
-    message = f"{name} is occupied: the footprint touches {'an ' if what == OBSTACLE else ''}{what} at {at(nearest)}"
+    obstacle = Obstacle(nearest_in_map(problem.map, worst), MAP_EDGE)
+    if math.dist(obstacle.nearest, worst) <= ROUNDING:
+        obstacle = nearest_obstacle(problem.map, problem.allow_unknown, worst, float(clearance.min()))
+    nearest, what, _ = obstacle
+    message = f"{name} is occupied: the footprint touches {_in_words(problem, obstacle)} at {at(nearest)}"
     if isinstance(problem.map, GridMap) and what == UNKNOWN_SPACE:
         around = problem.map.window(pose[:2], 2 * problem.vehicle.robot_radius)
         if ClearanceField(around, allow_unknown=True).pose_is_free(pose, problem.vehicle):
-            return f"{message}: drive there to map it, or set allow_unknown.", nearest
+            return f"{message}: {_remedy_for_unknown(obstacle)}.", nearest
     return f"{message}; move or turn it, or {_smaller(problem.vehicle)}.", nearest
+
+
+def _in_words(problem: Problem, obstacle: Obstacle) -> str:
+    """Return what an obstacle is; of a cell that is neither free nor occupied for sure, with its value."""
+    if not isinstance(problem.map, GridMap) or obstacle.value in (None, UNKNOWN, OCCUPIED):
+        return "an obstacle" if obstacle.kind == OBSTACLE else obstacle.kind
+    if obstacle.kind == OBSTACLE:
+        return f"an obstacle, a cell of {obstacle.value} %"
+    limits = problem.map.thresholds
+    return (f"{UNKNOWN_SPACE}, a cell of {obstacle.value} % (free is up to {limits.free_up_to} %, occupied from "
+            f"{limits.occupied_from} % on)")
+
+
+def _remedy_for_unknown(obstacle: Obstacle) -> str:
+    """Return what to do about unknown space."""
+    if obstacle.value in (None, UNKNOWN):
+        return "drive there to map it, or set allow_unknown"
+    return f"if that is free, set free_thresh to {obstacle.value / 100:g} or above, or allow_unknown"
 
 
 def _points_of(vehicle: Vehicle, pose: Pose) -> np.ndarray:
@@ -189,9 +211,10 @@ def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Poin
         return None
     clearance = field.at(passage.points)
     first = int(np.argmax(clearance < problem.vehicle.inscribed_radius + CLEARANCE_MARGIN))
-    begins, _ = nearest_obstacle(problem.map, False, tuple(passage.points[first].tolist()), float(clearance[first]))
+    begins = nearest_obstacle(problem.map, False, tuple(passage.points[first].tolist()), float(clearance[first]))
+    value = "" if begins.value in (None, UNKNOWN) else f" with a cell of {begins.value} %"
     return (f"unknown space separates start and goal for {_size(problem.vehicle)}; on the way between them "
-            f"it begins at {at(begins)}; drive there to map it, or set allow_unknown"), begins
+            f"it begins at {at(begins.nearest)}{value}; {_remedy_for_unknown(begins)}"), begins.nearest
 
 
 def _narrow_between(problem: Problem, field: ClearanceField, passage: Passage | None) -> tuple[str, Point | None]:
@@ -238,7 +261,7 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
         if (clearance < required).all():
             longest = int(np.argmax(driven))
             there = nearest_in_map(problem.map, tuple(points[longest].tolist()))
-            hit, _ = nearest_obstacle(problem.map, problem.allow_unknown, there, float(clearance[longest]))
-            return float(driven[longest]), hit
+            hit = nearest_obstacle(problem.map, problem.allow_unknown, there, float(clearance[longest]))
+            return float(driven[longest]), hit.nearest
         driven += np.where(clearance >= required, clearance - required + CLEARANCE_MARGIN, 0)
     return None

@@ -1,6 +1,7 @@
 """Obstacles around a point: the nearest one, and whether they leave room enough."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -21,6 +22,20 @@ DISC = np.array([(x / 8, y / 8) for x in range(-9, 10) for y in range(-9, 10) if
 DISC /= np.maximum(np.hypot(*DISC.T), 1)[:, None]
 #: ... and the largest distance of a point of the disc from the nearest of them.
 DISC_GAP = math.sqrt(2) / 16
+
+
+class Obstacle(NamedTuple):
+    """An obstacle near a point.
+
+    Attributes:
+        nearest: its point (x, y) that is nearest [m].
+        kind: OBSTACLE, UNKNOWN_SPACE or MAP_EDGE.
+        value: of the cell, where it is one of a grid.
+    """
+
+    nearest: Point
+    kind: str
+    value: int | None = None
 
 
 def rectangle(world_map: Map) -> tuple[np.ndarray, np.ndarray]:
@@ -53,32 +68,29 @@ def avoids_unknown(problem: Problem) -> bool:
             and bool((problem.map.blocked(False) != problem.map.blocked(True)).any()))
 
 
-def nearest_obstacle(world_map: Map, allow_unknown: bool, point: Point, clearance: float) -> tuple[Point, str]:
+def nearest_obstacle(world_map: Map, allow_unknown: bool, point: Point, clearance: float) -> Obstacle:
     """Find the nearest point of the obstacles around a point of the map, and what it belongs to.
 
     Args:
         world_map, allow_unknown: tell what the obstacles are.
         point: (x, y) [m].
         clearance: its distance to them [m].
-
-    Returns:
-        (x, y), and OBSTACLE, UNKNOWN_SPACE or MAP_EDGE.
     """
     on_edge = _nearest_on(shapely.LinearRing(world_map.corners()), point)
     if isinstance(world_map, GridMap):
-        found, what = _nearest_cell(world_map.window(point, clearance), allow_unknown, point)
+        found = _nearest_cell(world_map.window(point, clearance), allow_unknown, point)
     else:
-        found, what = _nearest_on(shapely.boundary(world_map.free), point) if clearance > 0 else point, OBSTACLE
-    if found is None or math.dist(on_edge, point) <= math.dist(found, point) + ROUNDING:
-        return on_edge, MAP_EDGE
-    return found, what
+        found = Obstacle(_nearest_on(shapely.boundary(world_map.free), point) if clearance > 0 else point, OBSTACLE)
+    if found is None or math.dist(on_edge, point) <= math.dist(found.nearest, point) + ROUNDING:
+        return Obstacle(on_edge, MAP_EDGE)
+    return found
 
 
-def _nearest_cell(grid: GridMap, allow_unknown: bool, point: Point) -> tuple[Point | None, str]:
-    """Return the nearest point of the squares of the blocked cells, if there are any, and what that one is."""
+def _nearest_cell(grid: GridMap, allow_unknown: bool, point: Point) -> Obstacle | None:
+    """Return the nearest of the squares of the blocked cells, if there are any."""
     rows, columns = np.nonzero(grid.blocked(allow_unknown))
     if len(rows) == 0:
-        return None, ""
+        return None
     here = grid.to_grid_frame(np.array(point))
     lowest = np.column_stack([columns, rows]) * grid.resolution
     nearest = np.clip(here, lowest, lowest + grid.resolution)
@@ -87,7 +99,8 @@ def _nearest_cell(grid: GridMap, allow_unknown: bool, point: Point) -> tuple[Poi
     is_obstacle = grid.blocked(True)[rows, columns] & (away <= away[first] + ROUNDING)
     first = np.argmax(is_obstacle) if is_obstacle.any() else first
     x, y = grid.to_map_frame(nearest[first]).tolist()
-    return (x, y), OBSTACLE if is_obstacle.any() else UNKNOWN_SPACE
+    value = int(grid.data[rows[first], columns[first]])
+    return Obstacle((x, y), OBSTACLE if is_obstacle.any() else UNKNOWN_SPACE, value)
 
 
 def _nearest_on(line: shapely.Geometry, point: Point) -> Point:

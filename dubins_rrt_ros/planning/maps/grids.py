@@ -14,9 +14,7 @@ from .errors import MapError, MapMetadataError
 from .images import read_image
 from .model import (
     FREE,
-    FREE_UP_TO,
     OCCUPIED,
-    OCCUPIED_FROM,
     UNKNOWN,
     GridMap,
 )
@@ -36,7 +34,7 @@ _SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
 def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
     """Write a grid as a map_server pair: the YAML file, and a binary PGM of the same name beside it.
 
-    The mode is trinary: cells up to 25 become free, from 65 on occupied, all others unknown.
+    The mode is trinary, by the thresholds of the grid.
 
     Raises:
         MapError: the name has another ending, or a file cannot be written.
@@ -46,8 +44,8 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
     fields = {"image": image.name, "mode": "trinary", "resolution": grid.resolution, "origin": list(grid.origin),
               "negate": 0, "occupied_thresh": _SAVED_OCCUPIED_THRESH, "free_thresh": _SAVED_FREE_THRESH}
     grey = np.full(grid.data.shape, _UNKNOWN_GREY, np.uint8)
-    grey[(grid.data >= 0) & (grid.data <= FREE_UP_TO)] = _FREE_GREY
-    grey[grid.data >= OCCUPIED_FROM] = _OCCUPIED_GREY
+    grey[(grid.data >= 0) & (grid.data <= grid.thresholds.free_up_to)] = _FREE_GREY
+    grey[grid.data >= grid.thresholds.occupied_from] = _OCCUPIED_GREY
     height, width = grid.data.shape
     try:
         if path.suffix not in (".yaml", ".yml"):

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -16,10 +16,32 @@ from .frame import Frame
 from .free_space import Shape, free_space, polygon_of, polygons_of
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
-#: Cell values up to the first are free, from the second on occupied, others unknown: map_server's default thresholds,
-#: 0.25 and 0.65, on the scale of nav_msgs/OccupancyGrid.
-FREE_UP_TO, OCCUPIED_FROM = 25, 65
 
+
+class Thresholds(NamedTuple):
+    """What the values of cells mean, on the scale of nav_msgs/OccupancyGrid; by default what map_server's 0.25 and 0.65 do.
+
+    Attributes:
+        free_up_to: maximum value of a free cell [%].
+        occupied_from: minimum value of an occupied cell [%]; between the two a cell is unknown.
+    """
+
+    free_up_to: int = 25
+    occupied_from: int = 65
+
+    @classmethod
+    def of_fractions(cls, free_thresh: float, occupied_thresh: float) -> "Thresholds":
+        """Take map_server's fractions, both inclusive."""
+        return cls(math.floor(100 * free_thresh + 1e-9), math.ceil(100 * occupied_thresh - 1e-9))
+
+    def blocked(self, data: np.ndarray, allow_unknown: bool) -> np.ndarray:
+        """Return (height, width) bool: which cells of a grid's data are obstacles."""
+        if allow_unknown:
+            return np.asarray(data >= self.occupied_from)
+        return np.asarray((data > self.free_up_to) | (data < 0))
+
+
+DEFAULT_THRESHOLDS = Thresholds()
 
 #: The smallest cells and the largest coordinates [m] that leave rounding far below what the planner guarantees.
 FINEST, FARTHEST = 1e-4, 1e8
@@ -35,6 +57,7 @@ class GridMap:
         resolution: the side of a cell [m].
         origin: (x [m], y [m], yaw [rad]) of the outer corner of cell (0, 0) in the map's frame.
         name: where it came from, for messages.
+        thresholds: which of these values are free, and which occupied.
         percent: take 1 as 1 % even if there is no cell above it. Without this such a grid is refused, since 1 is often meant to
             be an obstacle.
 
@@ -48,6 +71,7 @@ class GridMap:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     name: str = "grid"
     percent: InitVar[bool] = False
+    thresholds: Thresholds = field(default=DEFAULT_THRESHOLDS, kw_only=True)
 
     def __post_init__(self, percent: bool) -> None:
         data = np.array(self.data, order="C")
@@ -71,7 +95,7 @@ class GridMap:
 
     def blocked(self, allow_unknown: bool) -> np.ndarray:
         """Return (height, width) bool: the cells that are obstacles."""
-        return blocked_cells(self.data, allow_unknown)
+        return self.thresholds.blocked(self.data, allow_unknown)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -93,7 +117,11 @@ class GridMap:
         left, low = max(0, int(column) - cells), max(0, int(row) - cells)
         corner = self.to_map_frame(np.array([left, low]) * self.resolution)
         return GridMap(self.data[low:int(row) + cells + 1, left:int(column) + cells + 1], self.resolution,
-                       (*corner, self.origin[2]), self.name, percent=True)
+                       (*corner, self.origin[2]), self.name, percent=True, thresholds=self.thresholds)
+
+    def with_thresholds(self, thresholds: Thresholds) -> "GridMap":
+        """Return the map with the same cells, whose values are taken otherwise."""
+        return GridMap(self.data, self.resolution, self.origin, self.name, percent=True, thresholds=thresholds)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]; read-only."""
@@ -107,11 +135,12 @@ class GridMap:
     @cached_property
     def id(self) -> str:
         """A short digest of the content."""
-        return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin)).encode())
+        unusual = () if self.thresholds == DEFAULT_THRESHOLDS else (self.thresholds,)
+        return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin, *unusual)).encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Made anew, so that its cells are read-only again.
-        return partial(GridMap, percent=True), (self.data, self.resolution, self.origin, self.name)
+        return partial(GridMap, percent=True, thresholds=self.thresholds), (self.data, self.resolution, self.origin, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,13 +209,6 @@ Map = GridMap | PolygonMap
 def _check_name(name: Any) -> None:
     if not isinstance(name, str):
         raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
-
-
-def blocked_cells(data: np.ndarray, allow_unknown: bool) -> np.ndarray:
-    """Return (height, width) bool: which cells of a grid's data are obstacles."""
-    if allow_unknown:
-        return np.asarray(data >= OCCUPIED_FROM)
-    return np.asarray((data > FREE_UP_TO) | (data < 0))
 
 
 def _percentages(data: np.ndarray, name: str) -> np.ndarray:
