@@ -185,7 +185,8 @@ def image_named(folder, value):
 
 
 @pytest.mark.parametrize("content, word", [
-    (b"", "empty"), (b" \n", "empty"), (b"\xff\xfe", "UTF-8"), (b"a: [", "YAML"), (b"- 1\n- 2\n", "YAML"),
+    (b"", "empty"), (b" \n", "empty"), (b"\xff\xfe", "UTF-8"), (b"# a map\n\n# of nothing\n", "has no fields but comments"),
+    (b"a: [", "YAML"), (b"- 1\n- 2\n", "YAML"),
     (b"text", "YAML"), (b"a: 1\n---\nb: 2\n", "YAML"), (b"a: \x01", "YAML"), (b"*x", "YAML"), (b"? [a]\n: 1", "YAML"),
     (b"[" * 5000, "YAML"), (b'a: "\\U7fffffff"', "YAML"), (b"!!python/object/apply:os.getcwd []", "YAML"),
     (b"#" * 2**21, "bytes"), (b"&a [*a]", "YAML"), (b"origin: &a [*a, *a, *a]\nimage: m.pgm\nresolution: 1", "origin"),
@@ -193,6 +194,35 @@ def image_named(folder, value):
 def test_bad_yaml(tmp_path, content, word):
     (tmp_path / "bad.yaml").write_bytes(content)
     assert word in refusal(tmp_path / "bad.yaml", MapMetadataError)
+
+
+@pytest.mark.parametrize("again", ["resolution: 0.2", "image: n.pgm", '"resolution": 0.05', "other: {a: 1, b: 2, a: 3}"])
+def test_a_key_that_is_given_twice_is_refused(tmp_path, again):
+    path = write_grid(tmp_path)
+    path.write_text(f"{path.read_text()}{again}\n")
+    assert "is given twice, in line" in refusal(path, MapMetadataError)
+
+
+def test_one_line_may_give_a_key_twice_nowhere(tmp_path):
+    (tmp_path / "m.yaml").write_text("{image: a.pgm, image: b.pgm}")
+    assert "image is given twice" in refusal(tmp_path / "m.yaml", MapMetadataError)
+
+
+@pytest.mark.parametrize("old, new", [
+    (": 0.05", ":\t0.05"), ("0.05\n", "0.05\t# metres\n"), ("0.05\n", "0.05 \t \n"), (": 0.05", ": \t 0.05"),
+    ("[0, 0, 0]", "[0,\t0,\t0\t]"), ("image", "\t# a comment\n\t\nimage"), (": m.pgm", ":\tm.pgm\t")])
+def test_tabs_are_taken_where_map_server_takes_them(tmp_path, old, new):
+    path = write_grid(tmp_path)
+    expected, text = load_map(path), path.read_text().replace(old, new, 1)
+    assert "\t" in text
+    path.write_text(text)
+    assert load_map(path).id == expected.id
+
+
+def test_a_tab_is_no_indentation(tmp_path):
+    path = write_grid(tmp_path)
+    path.write_text("\t" + path.read_text())
+    assert "no valid YAML" in refusal(path, MapMetadataError)
 
 
 @pytest.mark.parametrize("field, value", [("resolution", "1e-9"), ("origin", "[1e9, 0, 0]")])

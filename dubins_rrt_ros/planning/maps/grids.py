@@ -19,7 +19,7 @@ from .model import (
     GridMap,
 )
 from .opening import ReadOptions, check_inside, located, opened, read_text
-from .yaml import load_plain
+from .yaml import RepeatedKey, load_plain
 
 #: Longest YAML file that is read [bytes].
 MAX_YAML_BYTES = 16 * 2**10
@@ -89,11 +89,15 @@ def load_grid(path: Path, options: ReadOptions) -> GridMap:
 
 def _parse_yaml(text: str) -> dict[str, Any]:
     try:
-        document = load_plain(text, aliases=True)  # as map_server's parser does it
+        document = load_plain(text, aliases=True, unique_keys=True)  # aliases as map_server's parser has them
     except RecursionError:
         raise MapMetadataError("YAML is nested too deep; give the fields of a map_server map") from None
+    except RepeatedKey as error:  # of which map_server takes the first, and others the last
+        raise MapMetadataError(f"{error}; make it one") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise MapMetadataError(f"is no valid YAML ({error}); correct the text") from None
+    if document is None:
+        raise MapMetadataError("has no fields but comments alone; give the fields of a map_server map")
     if not isinstance(document, dict):
         raise MapMetadataError(f"YAML is {quoted(document)}; give the fields of a map_server map")
     return document

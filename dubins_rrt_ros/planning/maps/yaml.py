@@ -1,7 +1,8 @@
 """YAML whose scalars stay texts, loaded without constructing objects."""
 
+from collections.abc import Hashable
 from itertools import accumulate
-from typing import Any
+from typing import Any, ClassVar
 
 import yaml
 
@@ -9,17 +10,24 @@ import yaml
 DEEPEST = 50
 
 
-def load_plain(text: str, *, aliases: bool) -> Any:
+class RepeatedKey(yaml.YAMLError):
+    """A key that a mapping has twice; parsers differ in which of its values they take."""
+
+
+def load_plain(text: str, *, aliases: bool, unique_keys: bool = False) -> Any:
     """Return the contents of a YAML document as dicts, lists and texts.
 
-    YAML 1.1 would make 1e-2 text, 010 eight, an image named 2024 a number, and a mode named off a boolean.
+    YAML 1.1 would make 1e-2 text, 010 eight, an image named 2024 a number, and a mode named off a boolean. Tabs are taken where
+    yaml-cpp and libyaml take them: between tokens, but not as indentation.
 
     Args:
         text: the document.
         aliases: True if aliases are allowed; a few lines of them can stand for billions of values, which take time to go
             through.
+        unique_keys: True if a key must not be given twice in a mapping, of which the last value would be taken.
 
     Raises:
+        RepeatedKey: a key is given twice where it must not.
         yaml.YAMLError: it is not valid YAML, or has an alias although none is allowed.
         RecursionError: it is nested too deep.
         ValueError, OverflowError: it has an escape of a character that does not exist.
@@ -27,11 +35,45 @@ def load_plain(text: str, *, aliases: bool) -> Any:
     # Brackets in quotes and comments count too; telling them apart is not worth it.
     if max(accumulate((letter in "[{") - (letter in "]}") for letter in text), default=0) > DEEPEST:
         raise RecursionError
-    return yaml.load(text, Loader=yaml.BaseLoader if aliases else _Loader)
+    loader = type("Loader", (_Loader,), {"aliases": aliases, "unique_keys": unique_keys})
+    return yaml.load(text, Loader=loader)
 
 
 class _Loader(yaml.BaseLoader):
+    """A loader of plain values.
+
+    Attributes:
+        aliases, unique_keys: see `load_plain`.
+    """
+
+    aliases: ClassVar[bool]
+    unique_keys: ClassVar[bool]
+
+    def scan_to_next_token(self) -> None:
+        super().scan_to_next_token()  # type: ignore[no-untyped-call]
+        while self.peek() == "\t":  # type: ignore[no-untyped-call]
+            if not self.flow_level:
+                self.allow_simple_key = False  # no key may follow: the tab would be indentation
+            self.forward()  # type: ignore[no-untyped-call]
+            super().scan_to_next_token()  # type: ignore[no-untyped-call]
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        if self.unique_keys:
+            _refuse_repeated_keys(node)
+        return super().construct_mapping(node, deep)
+
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
+        if not self.aliases and self.check_event(yaml.AliasEvent):
             raise yaml.composer.ComposerError(None, None, "there is an alias", self.peek_event().start_mark)  # type: ignore[no-untyped-call]  # PyYAML's stubs leave it untyped
         return super().compose_node(parent, index)
+
+
+def _refuse_repeated_keys(node: yaml.MappingNode) -> None:
+    lines: dict[str, int] = {}
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            continue
+        line = key.start_mark.line + 1
+        if key.value in lines:
+            raise RepeatedKey(f"{key.value} is given twice, in lines {lines[key.value]} and {line}")
+        lines[key.value] = line
