@@ -6,16 +6,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from .errors import PlanningError
+from .maps.frame import LARGEST_YAW
 from .maps.model import GridMap, Map, PolygonMap
 from .option import OptionError, convert_options, documented, option
 from .text import quoted
 from .vehicle import Vehicle
 
 Pose = tuple[float, float, float]
-
-
-#: Largest absolute yaw of a pose [rad]; beyond it, rounding has taken too many digits of the direction.
-LARGEST_YAW = 1e6
 
 
 class InvalidPose(PlanningError, ValueError):

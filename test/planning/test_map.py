@@ -48,7 +48,8 @@ def test_frames_are_inverse_and_rigid(x, y, yaw, px, py):
 @pytest.mark.parametrize("changes, word", [
     ({"data": np.zeros((0, 3))}, "cells"), ({"data": np.zeros(3)}, "cells"), ({"resolution": 0}, "resolution"),
     ({"resolution": math.nan}, "resolution"), ({"resolution": math.inf}, "resolution"),
-    ({"origin": (0, math.nan, 0)}, "origin")])
+    ({"origin": (0, math.nan, 0)}, "origin"), ({"origin": (0, 0, 1e300)}, "origin"), ({"origin": (0, 0)}, "origin"),
+    ({"origin": 3}, "origin"), ({"resolution": "fine"}, "resolution"), ({"resolution": None}, "resolution")])
 def test_bad_grid(changes, word):
     with pytest.raises(MapError, match=f"^yard: .*{word}.*; ?.*"):
         GridMap(**{"data": [[0]], "resolution": 1.0, "name": "yard", **changes})

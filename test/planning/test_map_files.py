@@ -165,7 +165,8 @@ NO_FILES = ["no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', '"' + 300 * "n" + '"'
 @pytest.mark.parametrize("field, values", [
     ("image", [None, "", "[a]", "m.yaml", *NO_FILES]),
     ("resolution", [None, "", "0", "-0.05", ".nan", "nan", "inf", "1e999", "five", "[0.05]"]),
-    ("origin", [None, "", "0", "000", "[0, 0]", "[0, 0, 0, 0]", "[0, nan, 0]", "[0, 0, x]", "[[0], 0, 0]", "{x: 1}"]),
+    ("origin", [None, "", "0", "000", "[0, 0]", "[0, 0, 0, 0]", "[0, nan, 0]",
+                "[0, 0, x]", "[0, 0, 1e300]", "[[0], 0, 0]", "{x: 1}"]),
     ("negate", [None, "2", "maybe", "[]", ""]),
     ("occupied_thresh", [None, "1.1", "65", "nan", "0.1", "[]"]),
     ("free_thresh", [None, "-0.1", "low", "0.65", "0.9"]),
@@ -227,7 +228,8 @@ def test_a_tab_is_no_indentation(tmp_path):
 
 @pytest.mark.parametrize("field, value", [("resolution", "1e-9"), ("origin", "[1e9, 0, 0]")])
 def test_cells_that_cannot_be_planned_on(tmp_path, field, value):
-    assert "cannot be planned on" in refusal(write_grid(tmp_path, **{field: value}), MapMetadataError)
+    message = refusal(write_grid(tmp_path, **{field: value}), MapMetadataError)
+    assert "cannot be planned on" in message and message.count("m.yaml") == 1
 
 
 @pytest.mark.parametrize("content, word", [

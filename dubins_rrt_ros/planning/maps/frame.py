@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+#: Largest absolute yaw of a pose [rad]; beyond it, rounding has taken too many digits of the direction.
+LARGEST_YAW = 1e6
+
 
 class Frame(NamedTuple):
     """A frame, by where its origin is in the map's frame and how far it is turned.

@@ -93,7 +93,7 @@ def _parse_yaml(text: str) -> dict[str, Any]:
     except RecursionError:
         raise MapMetadataError("YAML is nested too deep; give the fields of a map_server map") from None
     except RepeatedKey as error:  # of which map_server takes the first, and others the last
-        raise MapMetadataError(f"{error}; make it one") from None
+        raise MapMetadataError(f"{error}; give it once") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise MapMetadataError(f"is no valid YAML ({error}); correct the text") from None
     if document is None:

@@ -12,7 +12,7 @@ import shapely
 
 from ..text import quoted
 from .errors import MapError, MapMetadataError
-from .frame import Frame
+from .frame import LARGEST_YAW, Frame
 from .free_space import Shape, free_space, polygon_of, polygons_of
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -43,7 +43,7 @@ class Thresholds(NamedTuple):
 
 DEFAULT_THRESHOLDS = Thresholds()
 
-#: The smallest cells and the largest coordinates [m] that leave rounding far below what the planner guarantees.
+#: Smallest side of a cell and largest coordinate [m] that leave rounding far below what the planner guarantees.
 FINEST, FARTHEST = 1e-4, 1e8
 
 
@@ -74,6 +74,7 @@ class GridMap:
     thresholds: Thresholds = field(default=DEFAULT_THRESHOLDS, kw_only=True)
 
     def __post_init__(self, percent: bool) -> None:
+        _check_name(self.name)
         data = np.array(self.data, order="C")
         if data.ndim != 2 or data.size == 0:
             raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
@@ -81,17 +82,15 @@ class GridMap:
         if not percent and data.max() == 1:
             raise MapError(f"{self.name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
                            "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
-        if not (math.isfinite(self.resolution) and self.resolution > 0):
-            raise MapMetadataError(f"{self.name}: resolution is {self.resolution}; give a positive number of metres per cell")
-        if not all(map(math.isfinite, self.origin)):
-            raise MapMetadataError(f"{self.name}: origin is {self.origin}; its x, y and yaw must be finite")
-        if self.resolution < FINEST or max(map(abs, (*self.origin[:2], *(n * self.resolution for n in data.shape)))) > FARTHEST:
-            raise MapMetadataError(f"{self.name}: cells of {self.resolution:g} m, {data.shape[1]} x {data.shape[0]} of them "
-                                   f"from ({self.origin[0]:g}, {self.origin[1]:g}) on, cannot be planned on; give metres, "
-                                   f"cells of {FINEST:g} m at least and coordinates up to {FARTHEST:g} m")
+        resolution, origin = _checked_resolution(self.resolution, self.name), _checked_origin(self.origin, self.name)
+        rows, columns = data.shape
+        if resolution < FINEST or max(map(abs, (*origin[:2], rows * resolution, columns * resolution))) > FARTHEST:
+            raise MapMetadataError(f"{self.name}: cells of {resolution:g} m, {columns} x {rows} of them from ({origin[0]:g}, "
+                                   f"{origin[1]:g}) on, cannot be planned on; give metres, cells of {FINEST:g} m at least and "
+                                   f"coordinates up to {FARTHEST:g} m")
         object.__setattr__(self, "data", _read_only(data))
-        object.__setattr__(self, "resolution", float(self.resolution))
-        object.__setattr__(self, "origin", tuple(map(float, self.origin)))
+        object.__setattr__(self, "resolution", resolution)
+        object.__setattr__(self, "origin", origin)
 
     def blocked(self, allow_unknown: bool) -> np.ndarray:
         """Return (height, width) bool: the cells that are obstacles."""
@@ -209,6 +208,27 @@ Map = GridMap | PolygonMap
 def _check_name(name: Any) -> None:
     if not isinstance(name, str):
         raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
+
+
+def _checked_resolution(resolution: Any, name: str) -> float:
+    try:
+        number = float(resolution)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise MapMetadataError(f"{name}: resolution is {quoted(resolution)}; give a positive number of metres per cell")
+    return number
+
+
+def _checked_origin(origin: Any, name: str) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = map(float, origin)
+    except (TypeError, ValueError, OverflowError):
+        x = y = yaw = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and abs(yaw) <= LARGEST_YAW):
+        raise MapMetadataError(f"{name}: origin is {quoted(origin)}; give x and y, finite, in metres, and a yaw in radians "
+                               f"within {LARGEST_YAW:g} of 0, where rounding leaves its direction exact")
+    return x, y, yaw
 
 
 def _percentages(data: np.ndarray, name: str) -> np.ndarray:

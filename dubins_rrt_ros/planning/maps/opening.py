@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from ..text import one_line
 from .errors import MapError, MapNotFound
 
 #: Default maximum number of cells of a grid: ten kilometres square at a resolution of 1 m, half a kilometre at 5 cm.
@@ -95,5 +96,5 @@ def read_text(path: Path, max_bytes: int, refusal: type[MapError] = MapError) ->
 
 
 def located(path: Path, error: MapError) -> MapError:
-    """Return the error, of the same class, with the file's name in front."""
-    return type(error)(f"{path}: {error}")
+    """Return the error, of the same class, with the file's name in front, which a map's own errors give already."""
+    return type(error)(f"{path}: {str(error).removeprefix(one_line(path.name) + ': ')}")

@@ -50,12 +50,12 @@ class _Loader(yaml.BaseLoader):
     unique_keys: ClassVar[bool]
 
     def scan_to_next_token(self) -> None:
-        super().scan_to_next_token()  # type: ignore[no-untyped-call]
-        while self.peek() == "\t":  # type: ignore[no-untyped-call]
+        super().scan_to_next_token()
+        while self.peek() == "\t":
             if not self.flow_level:
                 self.allow_simple_key = False  # no key may follow: the tab would be indentation
-            self.forward()  # type: ignore[no-untyped-call]
-            super().scan_to_next_token()  # type: ignore[no-untyped-call]
+            self.forward()
+            super().scan_to_next_token()
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         if self.unique_keys:
