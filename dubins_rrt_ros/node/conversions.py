@@ -16,6 +16,7 @@ from std_msgs.msg import Header
 from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, Thresholds, rasterise
 from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 from dubins_rrt_ros.planning.problem import Pose
+from dubins_rrt_ros.planning.text import one_line, quoted_name
 
 #: Minimum norm of a quaternion that is taken, and the deviation from 1 beyond which it is doubtful.
 LEAST_NORM, DOUBTFUL_NORM = 1e-3, 0.1
@@ -140,7 +141,7 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds
     """
     info, name = message.info, "the map message"
     if message.header.frame_id not in ("", frame):
-        raise MapError(f"{name} is in frame '{message.header.frame_id}', not in '{frame}'; publish it in '{frame}' "
+        raise MapError(f"{name} is in frame {quoted_name(message.header.frame_id)}, not in '{frame}'; publish it in '{frame}' "
                        "or set global_frame")
     cells = info.width * info.height
     if cells > max_map_cells:
@@ -197,7 +198,7 @@ def status_message(node: str, status: Status, message: str, *, plan_id: int = 0,
     """
     values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
     values |= _figures(plan) | {"map_id": map_id}
-    return DiagnosticStatus(level=_level(status, plan, plan_id), name=f"{node}: planner", message=message,
+    return DiagnosticStatus(level=_level(status, plan, plan_id), name=f"{node}: planner", message=one_line(message),
                             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()])
 
 

@@ -7,6 +7,7 @@ from rclpy.time import Time
 
 from dubins_rrt_ros.planning import InvalidPose, Status
 from dubins_rrt_ros.planning.problem import Pose
+from dubins_rrt_ros.planning.text import quoted_name
 
 from .conversions import bare_pose, doubts_about, pose_from, transformed
 from .request import Refusal
@@ -62,5 +63,5 @@ class Frames:
             raise self._refusal(name, frame, f"{' '.join(str(error).split()).rstrip('.')}; publish that transform, or") from None
 
     def _refusal(self, name: str, frame: str, why: str) -> Refusal:
-        return Refusal(Status.TF_ERROR, f"The {name} pose is in frame '{frame}' and cannot be transformed to '{self._frame}': "
-                                        f"{why} publish the pose in '{self._frame}'.")
+        return Refusal(Status.TF_ERROR, f"The {name} pose is in frame {quoted_name(frame)} and cannot be transformed to "
+                                        f"'{self._frame}': {why} publish the pose in '{self._frame}'.")

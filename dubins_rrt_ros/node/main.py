@@ -11,6 +11,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.utilities import remove_ros_args
 
 from dubins_rrt_ros.planning import MapError, OptionError
+from dubins_rrt_ros.planning.text import one_line
 
 from .parameter_files import as_yaml, unused_files
 from .parameter_table import as_table
@@ -76,13 +77,13 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
     try:
         rclpy.init(args=arguments)
     except RuntimeError as error:  # a ROS argument or a parameter file that cannot be read
-        raise ConfigurationError(_one_line(error)) from error
+        raise ConfigurationError(one_line(str(error))) from error
     try:
         node = PlannerNode()
     except MapError as error:
         raise ConfigurationError(f"map_file: {error}") from error
     except (OptionError, NameValidationException, ParameterException) as error:
-        raise ConfigurationError(_one_line(error)) from error
+        raise ConfigurationError(one_line(str(error))) from error
     except Exception as error:
         if not rclpy.ok():  # a signal came meanwhile
             raise ExternalShutdownException from error
@@ -107,9 +108,5 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     try:
         own = remove_ros_args(arguments)[1:]
     except RuntimeError as error:
-        raise ConfigurationError(_one_line(error)) from error
+        raise ConfigurationError(one_line(str(error))) from error
     return parser.parse_args(own)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter
 from dubins_rrt_ros.planning import GridMap, Map, MapError, Vehicle, World, load_map, prepare
 from dubins_rrt_ros.planning.collision.footprint import summary
 from dubins_rrt_ros.planning.maps.locate import find_map
+from dubins_rrt_ros.planning.text import one_line
 
 from .conversions import as_grid, grid_from, grid_message
 from .executor_queue import ExecutorQueue
@@ -135,7 +136,7 @@ class Maps:
         self.map, self.grid, self.refusal = world_map, grid, ""
         self._came_by_topic = by_topic
         height, width = grid.data.shape
-        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {world_map.name}")
+        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {one_line(world_map.name)}")
         self._newest_world()
         if self._publisher is not None:
             self._publisher.publish(self.message(grid))
@@ -187,7 +188,7 @@ class Maps:
         while (outcome := _next_of(loaded, LOADING_INTERVAL)) is None:
             if not self._node.context.ok():
                 raise ExternalShutdownException
-            self._node.get_logger().info(f"Still loading the map {name}", throttle_duration_sec=STILL_LOADING_INTERVAL)
+            self._node.get_logger().info(f"Still loading the map {one_line(name)}", throttle_duration_sec=STILL_LOADING_INTERVAL)
         if isinstance(outcome, Exception):
             raise outcome
         return outcome

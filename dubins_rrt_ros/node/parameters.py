@@ -10,6 +10,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, Vehicle, options
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.option import Option, convert_options, option
+from dubins_rrt_ros.planning.text import quoted_name
 
 
 @dataclass(frozen=True)
@@ -177,4 +178,4 @@ def _unknown(name: str) -> str:
     # A section that is nested too deep is part of the name.
     near = difflib.get_close_matches(name.rpartition(".")[2].lower(), OPTIONS, n=1)
     remedy = f"did you mean {near[0]!r}?" if near else "planner --help lists the parameters"
-    return f"Unknown parameter {name!r} is ignored; {remedy}"
+    return f"Unknown parameter {quoted_name(name)} is ignored; {remedy}"

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from dubins_rrt_ros.planning.text import one_line
+
 #: What is of interest now alone: poses.
 VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 #: What whoever subscribes later gets too.
@@ -33,7 +35,7 @@ def _clauses(publishers: Iterable[TopicEndpointInfo], reason: Callable[[TopicEnd
 
 def _incompatibility(publisher: TopicEndpointInfo, kind: str) -> str:
     if publisher.topic_type != kind:
-        return f"publishes {publisher.topic_type} there, not {kind}; give one of them another name"
+        return f"publishes {one_line(publisher.topic_type)} there, not {kind}; give one of them another name"
     if publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT:
         return "offers it with best-effort reliability, which does not fit; publish it reliably"
     return ""
@@ -50,4 +52,4 @@ def _durability_incompatibility(publisher: TopicEndpointInfo, transient_local: b
 
 
 def _name(publisher: TopicEndpointInfo) -> str:
-    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+    return one_line(f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}")

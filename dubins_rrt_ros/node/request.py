@@ -6,6 +6,7 @@ from concurrent.futures import Future, wait
 from dataclasses import dataclass, replace
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan
+from dubins_rrt_ros.planning.text import one_line
 
 #: Minimum time between two reports of an improved path [s].
 IMPROVEMENT_INTERVAL = 0.1
@@ -17,7 +18,7 @@ class Refusal(Exception):
     """A request that is not planned: the status and the sentence that say why."""
 
     def __init__(self, status: Status, message: str):
-        super().__init__(message)
+        super().__init__(one_line(message))
         self.status = status
 
 

@@ -14,15 +14,12 @@ from .option import is_number, options, values
 from .problem import Problem, checked_pose
 from .result import Plan
 from .settings import MAX_PLANNING_TIME, Settings
-from .text import one_line, quoted
+from .text import quoted
 from .vehicle import Vehicle
 
 
 class PlanFileError(PlanningError, ValueError):
-    """A document that holds no plan; the message, one line, says what is wrong with it."""
-
-    def __init__(self, message: str):
-        super().__init__(one_line(message))
+    """A document that holds no plan; the message says what is wrong with it."""
 
 
 def to_document(plan: Plan, map_name: str) -> dict[str, Any]:

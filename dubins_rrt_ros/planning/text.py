@@ -7,6 +7,8 @@ from typing import Any
 #: The longest message [characters], of a longer one the middle is left out; a path may take 4096 of them.
 LONGEST = 6000
 _MOST_QUOTED = 200
+#: Maximum length of a quoted name [characters].
+_LONGEST_NAME = 220
 
 
 def one_line(message: str) -> str:
@@ -22,6 +24,13 @@ def quoted(value: Any) -> str:
     """`value` as Python writes it, of a long or deep one only the beginning."""
     text = _SHORT.repr(value)
     return text if len(text) <= _MOST_QUOTED else f"{text[:_MOST_QUOTED]}..."
+
+
+def quoted_name(name: str) -> str:
+    """Return a name as Python writes it; of one that is too long for a name the middle is left out."""
+    text = repr(name)
+    half = _LONGEST_NAME // 2 - 2
+    return text if len(text) <= _LONGEST_NAME else f"{text[:half]}...{text[-half:]}"
 
 
 def at(point: tuple[float, float]) -> str:

@@ -95,6 +95,21 @@ def test_a_pose_in_a_frame_that_nobody_knows_is_refused_whichever_way_it_comes(t
         assert_says(said_of(talk, way, at(), frame), "202", "TF_ERROR", f"The {name} pose", f"'{frame}'", "'map'")
 
 
+#: Names that would forge lines of the log, clear the screen, or fill the disk.
+FORGED = ["map\n[ERROR] [1.0] [planner]: forged", "\x1b[2J\x1b[31mred\x1b[0m", "a\rb\u2028c\u202ed", "x" * 1_000_000]
+
+
+@pytest.mark.parametrize("frame", FORGED, ids=["lines", "escapes", "separators", "long"])
+def test_a_frame_from_outside_is_told_quoted_on_one_line_and_cut(talk, frame):
+    said = len(talk.process.output)
+    for way, name in WAYS.items():
+        told = said_of(talk, way, at(), frame)
+        assert_says(told, "202", "TF_ERROR", f"The {name} pose is in frame '", "'map'")
+        assert told["message"].isprintable() and len(told["message"]) < 500
+    lines = talk.process.output[said:].splitlines()
+    assert [line for line in lines if not line.isprintable() or line.startswith("[ERROR] [1.0]") or len(line) > 600] == []
+
+
 @pytest.mark.parametrize("pose", [
     at(x=8.5, z=1e300), turned(w=-1.0), turned(w=1.0005), turned(z=-0.70711, w=0.70711), turned(x=0.004, w=1.0), turned(w=0.9),
     turned(w=2.0), turned(w=1e300), turned(z=0.5, w=0.5), turned(z=0.7, w=0.7), turned(x=1.0, y=1.0, z=1.0, w=1.0),
@@ -111,6 +126,7 @@ def test_what_is_unusual_about_a_pose_is_warned_of_once(module_planners, talk, c
     process = module_planners.start(**QUICK)
     client = module_planners.client()
     client.publish_map(occupancy(box().data))
+    client.wait_for_word("The map is ready")
     fresh = Conversation(process, client)
     for _ in range(3):
         fresh.plan(turned(**components), GOAL)

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 from support.harness import Conversation, assert_says
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
-from dubins_rrt_ros.planning import OCCUPIED, GridMap, Thresholds
+from dubins_rrt_ros.planning import OCCUPIED, GridMap, Thresholds, save_map
 
 #: On a map of 10 m x 10 m with a box of 2 m in its middle.
 START, GOAL = (1.5, 5.0, 0.0), (8.5, 5.0, 0.5)
@@ -114,6 +114,29 @@ def test_a_map_that_is_none_is_refused_and_the_one_before_stays(talk, fields, wo
     talk.client.publish_map(changed(**fields))
     line = refusal(talk, said)
     assert [word for word in words if word not in line] == [], line
+
+
+@pytest.mark.parametrize("frame", ["map\n[ERROR] [1.0] [planner]: forged", "\x1b[2Jred", "x" * 1_000_000],
+                         ids=["lines", "escapes", "long"])
+def test_a_map_s_frame_is_told_quoted_on_one_line_and_cut(talk, frame):
+    said = len(talk.process.output)
+    talk.client.publish_map(changed(frame_id=frame))
+    assert refusal(talk, said).isprintable()
+    lines = talk.process.output[said:].splitlines()
+    assert [line for line in lines if not line.isprintable() or line.startswith("[ERROR] [1.0]") or len(line) > 600] == []
+
+
+def test_the_name_of_a_map_file_is_told_on_one_line(on_other_maps, tmp_path):
+    name = "a\n[ERROR] [1.0] [planner]: forged\x1b[2J.yaml"
+    save_map(box(), tmp_path / "box.yaml")
+    (tmp_path / name).write_text((tmp_path / "box.yaml").read_text())
+    said = len(on_other_maps.process.output)
+    for file in (tmp_path / name, tmp_path / f"no {name}"):
+        on_other_maps.client.call(LoadMap, "load_map", map_url=str(file))
+    on_other_maps.client.wait_for_word("no a ")
+    lines = on_other_maps.process.output[said:].splitlines()
+    assert [line for line in lines if not line.isprintable() or line.startswith("[ERROR] [1.0]")] == []
+    assert any("Took a map of 100 x 100 cells: a [ERROR]" in line for line in lines)
 
 
 def test_a_map_whose_origin_is_turned_is_planned_on(on_other_maps):

@@ -1,14 +1,10 @@
 """Errors of maps and of their files."""
 
 from ..errors import PlanningError
-from ..text import one_line
 
 
 class MapError(PlanningError, ValueError):
-    """A map that cannot be used; the message, one line that any terminal can show, names what is wrong and the remedy."""
-
-    def __init__(self, message: str):
-        super().__init__(one_line(message))
+    """A map that cannot be used; the message names what is wrong and the remedy."""
 
 
 class MapNotFound(MapError):
