@@ -64,7 +64,7 @@ setup(
     extras_require={"ros": ROS, "plots": PLOTS, "evaluation": PLOTS, "test": TEST},
     entry_points={
         "console_scripts": [
-            f"planner = {PACKAGE}.node.main:main",
+            f"planner = {PACKAGE}.node.__main__:main",
             f"dubins_rrt = {PACKAGE}.cli.main:main",
         ],
     },

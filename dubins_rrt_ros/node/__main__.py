@@ -1,7 +1,19 @@
-"""Entry point of `python -m dubins_rrt_ros.node`, which runs the planner node."""
+"""The command `planner`, which is `python -m dubins_rrt_ros.node` too: run the node, or say that ROS 2 is missing."""
 
 import sys
+from importlib.util import find_spec
 
-from .main import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the node, and return the exit status: 1 without ROS 2."""
+    if find_spec("rclpy") is None:
+        print("planner: ROS 2 is not here (no module rclpy); source its setup file, or run: pip install 'dubins_rrt_ros[ros]'",
+              file=sys.stderr)
+        return 1
+    from .main import main as run
+
+    return run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -88,7 +88,7 @@ def read_path(document: Mapping[str, Any]) -> Path | None:
     try:
         return Path.of_curves(_triple(poses[0], "poses"), _triple(poses[-1], "poses"), curves)
     except PathError as error:
-        raise PlanFileError(f"its curves are no path: {error}") from None
+        raise PlanFileError(f"its curves do not form a path: {error}") from None
 
 
 def _read_curve(curve: Any) -> DubinsCurve:

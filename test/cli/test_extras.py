@@ -1,4 +1,4 @@
-"""`dubins_rrt` where matplotlib and tqdm, which come with an extra, are not installed."""
+"""`dubins_rrt` and `planner` where packages that come with an extra are not installed."""
 
 import subprocess
 import sys
@@ -43,3 +43,11 @@ def test_what_draws_says_what_to_install_before_any_work(words, extra, tmp_path)
     assert done.returncode == 2 and done.stdout == "" and list(tmp_path.iterdir()) == []
     assert done.stderr.endswith(f"dubins_rrt {words[0]}: error: pictures are drawn by matplotlib, which is not installed; "
                                 f"run: pip install 'dubins_rrt_ros[{extra}]'\n")
+
+
+def test_without_ros_the_planner_says_what_to_install():
+    blocked = "import sys; sys.modules['rclpy'] = None; from dubins_rrt_ros.node.__main__ import main; sys.exit(main())"
+    done = subprocess.run([sys.executable, "-c", blocked], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == ("planner: ROS 2 is not here (no module rclpy); source its setup file, or run: "
+                           "pip install 'dubins_rrt_ros[ros]'\n")

@@ -15,7 +15,7 @@ from matplotlib.image import imread
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, Outcome, PaperRun
+from dubins_rrt_ros.evaluation.paper.runs import MARKS, TABLE, Measured, PaperRun, RunOutcome
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
@@ -38,7 +38,7 @@ def lengths(folder):
 
 
 def outcome(length, samples_to_first):
-    return Outcome(length, 5, 1.5, 0.01, samples_to_first, 3.0)
+    return RunOutcome(length, 5, 1.5, 0.01, samples_to_first, 3.0)
 
 
 def report_rows(folder, first):

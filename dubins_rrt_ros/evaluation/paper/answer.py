@@ -6,7 +6,7 @@ from typing import Any
 
 from dubins_rrt_ros.cli.bench.report import median, metres, milliseconds
 
-from .runs import ENVIRONMENTS, LIMITED, MAZE, UNLIMITED, Measured, Outcome
+from .runs import ENVIRONMENTS, LIMITED, MAZE, UNLIMITED, Measured, RunOutcome
 
 FOUND = """\
 **What was found**, in block, maze and forest in this order. *Without a limit to the step* RRT\\*'s paths are shorter: with
@@ -90,13 +90,13 @@ def _stuck(measured: Measured) -> dict[str, str | int]:
     return {"unsolved": len(farthest), "reach": metres(max(farthest, default=math.inf))}
 
 
-def _medians(measured: Measured, figure: Callable[[Outcome], float], planner: str, headings: str, step_size: float
+def _medians(measured: Measured, figure: Callable[[RunOutcome], float], planner: str, headings: str, step_size: float
              ) -> list[float]:
     """Return the median of a figure in each environment."""
     return [_median(measured, figure, environment, planner, headings, step_size) for environment in ENVIRONMENTS]
 
 
-def _median(measured: Measured, figure: Callable[[Outcome], float], environment: str, planner: str, headings: str,
+def _median(measured: Measured, figure: Callable[[RunOutcome], float], environment: str, planner: str, headings: str,
             step_size: float) -> float:
     return median(map(figure, measured.of(environment, planner, headings=headings, step_size=step_size)))
 

@@ -12,7 +12,7 @@ from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, wr
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
-from .runs import Measured, Outcome, PaperRun, all_runs, outcomes
+from .runs import Measured, PaperRun, RunOutcome, all_runs, outcomes
 
 SEEDS = 30
 REPORT, LINES = "report.md", "runs.jsonl"
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _measured(file: Path, seeds: int, jobs: int) -> Measured:
     """Make all runs, each written to the file as soon as it is done."""
     runs = all_runs(seeds)
-    done: dict[PaperRun, Outcome] = {}
+    done: dict[PaperRun, RunOutcome] = {}
     with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(outcomes(runs, jobs)) as running:
         for run, outcome in with_bar(running, len(runs), " runs"):
             done[run] = outcome

@@ -28,7 +28,7 @@ from .runs import (
     STEPS,
     UNLIMITED,
     Measured,
-    Outcome,
+    RunOutcome,
     picture_name,
     planned,
 )
@@ -112,7 +112,7 @@ def _draw_curve(axes: Axes, planner: str, lengths: list[list[float]]) -> None:
 
 def _question(measured: Measured) -> Figure:
     """Draw a column of panels for each environment: time to the first path, and the lengths of RRT and RRT*."""
-    rows: list[tuple[str, tuple[str, ...], Callable[[Outcome], float]]] = [
+    rows: list[tuple[str, tuple[str, ...], Callable[[RunOutcome], float]]] = [
         ("first path [ms]", PLANNERS, lambda run: 1000 * run.time_to_first),
         ("RRT: length [m]", ("rrt",), lambda run: run.length),
         (f"RRT*, {MOST} samples:\nlength [m]", ("rrt_star",), lambda run: run.length)]
@@ -128,8 +128,8 @@ def _question(measured: Measured) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, measured: Measured, environment: str, planners: tuple[str, ...], figure_of: Callable[[Outcome], float]
-                ) -> None:
+def _draw_panel(axes: Axes, measured: Measured, environment: str, planners: tuple[str, ...],
+                figure_of: Callable[[RunOutcome], float]) -> None:
     decorate(axes)
     for planner, step_size in product(planners, STEPS):
         place = 0.0 if len(planners) == 1 else PLANNER_OFFSET if planner == "rrt_star" else -PLANNER_OFFSET
@@ -150,7 +150,7 @@ def _name_ticks(panels: np.ndarray) -> None:
 
 
 def _draw_kind(axes: Axes, measured: Measured, environment: str, planner: str, step_size: float, place: float,
-               figure_of: Callable[[Outcome], float]) -> None:
+               figure_of: Callable[[RunOutcome], float]) -> None:
     """Draw medians and quartiles of the runs of a planner with a step size, and how many found a path if not all did."""
     for i, headings in enumerate(HEADINGS):
         runs = measured.of(environment, planner, headings=headings, step_size=step_size)

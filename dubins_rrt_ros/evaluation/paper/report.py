@@ -26,7 +26,7 @@ from .runs import (
     TABLE,
     TURNING_RADIUS,
     Measured,
-    Outcome,
+    RunOutcome,
     picture_name,
 )
 
@@ -101,7 +101,7 @@ def to_document(measured: Measured) -> dict[str, Any]:
             "answer": [_prose(FOUND, **found(measured)), _prose(WHY, **why(measured))]}
 
 
-def _figures(runs: list[Outcome]) -> dict[str, Any]:
+def _figures(runs: list[RunOutcome]) -> dict[str, Any]:
     return {"runs": len(runs), "solved": sum(run.solved for run in runs), "length": quartiles(run.length for run in runs),
             "time_to_first": quartiles(run.time_to_first for run in runs),
             "samples_to_first": quartiles(run.samples_to_first for run in runs)}
@@ -163,16 +163,16 @@ def _question_row(measured: Measured, environment: str, headings: str, step_size
             *(cell for runs in kinds for cell in _question_cells(runs))]
 
 
-def _question_cells(runs: list[Outcome]) -> list[str]:
+def _question_cells(runs: list[RunOutcome]) -> list[str]:
     return [_solved(runs), with_quartiles([run.time_to_first for run in runs], milliseconds),
             metres(median(run.samples_to_first for run in runs), 0), _lengths(runs)]
 
 
-def _solved(runs: list[Outcome]) -> str:
+def _solved(runs: list[RunOutcome]) -> str:
     return f"{sum(run.solved for run in runs)}/{len(runs)}"
 
 
-def _lengths(runs: list[Outcome]) -> str:
+def _lengths(runs: list[RunOutcome]) -> str:
     return with_quartiles([run.length for run in runs], metres)
 
 

@@ -51,7 +51,7 @@ class PaperRun(NamedTuple):
     seed: int
 
 
-class Outcome(NamedTuple):
+class RunOutcome(NamedTuple):
     """The outcome of a run; without a path all but `reach` is infinite.
 
     Attributes:
@@ -75,7 +75,7 @@ class Outcome(NamedTuple):
         """True if there is a path."""
         return math.isfinite(self.length)
 
-    def within(self, samples: int) -> "Outcome":
+    def within(self, samples: int) -> "RunOutcome":
         """Return the outcome after this number of samples, for a run that ends with its first path."""
         return self if self.samples_to_first <= samples else _outcome_without_path(self.reach)
 
@@ -83,11 +83,11 @@ class Outcome(NamedTuple):
 class Measured:
     """The outcomes of all runs, each with the seeds 0 to `seeds` - 1."""
 
-    def __init__(self, outcomes: Mapping[PaperRun, Outcome], seeds: int):
+    def __init__(self, outcomes: Mapping[PaperRun, RunOutcome], seeds: int):
         self.outcomes, self.seeds = outcomes, seeds
 
     def of(self, environment: str, planner: str, samples: int = MOST, headings: str = "uniform", step_size: float = UNLIMITED
-           ) -> list[Outcome]:
+           ) -> list[RunOutcome]:
         """Return the outcomes of runs that differ in the seed alone, by seed.
 
         RRT ends with its first path: from its run with most samples follow those with fewer.
@@ -118,7 +118,7 @@ def all_runs(seeds: int) -> list[PaperRun]:
     return [PaperRun(*kind, seed) for kind in dict.fromkeys(kinds) for seed in range(seeds)]
 
 
-def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[tuple[PaperRun, Outcome], None, None]:
+def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[tuple[PaperRun, RunOutcome], None, None]:
     """Yield the runs with their outcomes, in any order, measured in `jobs` processes; one is this process.
 
     Raises:
@@ -127,7 +127,7 @@ def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[tuple[PaperRun, O
     yield from map(measure, runs) if jobs == 1 else run_in_processes(measure, runs, jobs, NO_LIMIT, _lost)
 
 
-def measure(run: PaperRun) -> tuple[PaperRun, Outcome]:
+def measure(run: PaperRun) -> tuple[PaperRun, RunOutcome]:
     """Plan once."""
     samples_at_first: list[int] = []
 
@@ -139,7 +139,7 @@ def measure(run: PaperRun) -> tuple[PaperRun, Outcome]:
     reach = float(answer.tree.poses[:, 0].max())
     if answer.path is None or answer.time_to_first is None:
         return run, _outcome_without_path(reach)
-    return run, Outcome(answer.path.length, len(answer.path.curves), _full_circles(answer.path), answer.time_to_first,
+    return run, RunOutcome(answer.path.length, len(answer.path.curves), _full_circles(answer.path), answer.time_to_first,
                         samples_at_first[0], reach)
 
 
@@ -159,8 +159,8 @@ def problem_in(environment: str) -> Problem:
     return Problem(world, start=poses["start"], goal=poses["goal"])
 
 
-def _outcome_without_path(reach: float) -> Outcome:
-    return Outcome(math.inf, math.inf, math.inf, math.inf, math.inf, reach)
+def _outcome_without_path(reach: float) -> RunOutcome:
+    return RunOutcome(math.inf, math.inf, math.inf, math.inf, math.inf, reach)
 
 
 def _full_circles(path: Path) -> float:

@@ -1,4 +1,4 @@
-"""The audit of curves that are no path, such as the edges of a tree, and of poses: many at once, each on its own."""
+"""The audit of curves that do not form a path, such as the edges of a tree, and of poses: many at once, each on its own."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
