@@ -19,7 +19,7 @@ from .common.example import ENDS, MAP
 from .common.flags import add_option_flags, given_options
 from .common.output import check_folder, finite, words_for, write_document
 from .common.parser import Parser, UsageError, add_json_flag, describe
-from .common.request import add_map_arguments, read_map
+from .common.request import add_map_arguments, map_options, read_map
 
 #: Default tolerances of poses [m, rad]: ample for four digits behind the point.
 TOLERANCE_XY, TOLERANCE_YAW = 1e-3, 1e-3
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _judge(arguments: argparse.Namespace) -> Verdict:
     document = read_json(arguments.path)
-    world_map, _ = read_map(arguments.map, arguments.max_map_cells)
+    world_map, _ = read_map(arguments.map, **map_options(arguments))
     try:
         if isinstance(document, Mapping) and "curves" in document:
             return _judge_plan(document, world_map, arguments)

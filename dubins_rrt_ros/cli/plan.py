@@ -10,14 +10,14 @@ from dataclasses import replace
 from types import FrameType
 from typing import Any, TextIO
 
-from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Vehicle, plan
+from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan
 
 from .common.example import ENDS, EXAMPLE, MAP
 from .common.flags import add_option_flags, given_options
 from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
-from .common.request import LoadedRequest, add_map_arguments, read_map, read_replay
+from .common.request import MAP_FLAGS, LoadedRequest, add_map_arguments, map_options, read_map, read_replay
 
 
 class _Replay(argparse.Action):
@@ -74,16 +74,16 @@ def run(arguments: argparse.Namespace) -> int:
 def _request(arguments: argparse.Namespace) -> LoadedRequest:
     if arguments.replay is None:
         return _new_request(arguments)
-    others = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", "max_map_cells"}
+    others = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", *MAP_FLAGS}
     if others:
         raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(others))}")
-    return read_replay(arguments.replay, arguments.max_map_cells)
+    return read_replay(arguments.replay, **map_options(arguments))
 
 
 def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
     vehicle = Vehicle(**given_options(arguments, Vehicle))
     settings = Settings(**given_options(arguments, Settings))
-    world_map, load_time = read_map(arguments.map, arguments.max_map_cells)
+    world_map, load_time = read_map(arguments.map, **map_options(arguments))
     problem = Problem(world_map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
     return LoadedRequest(arguments.map, problem, settings, load_time)
 
@@ -138,6 +138,7 @@ def _report(answer: Plan, request: LoadedRequest, out: TextIO) -> None:
 
 def _more_figures(answer: Plan) -> str:
     """Return the figures that the message of a path leaves out: it has length, gap, samples and planning time."""
+    grid = answer.problem.map
     return (f"Lower bound {answer.lower_bound:.2f} m, first path after {answer.time_to_first:.3g} s, "
             f"{len(answer.tree)} tree nodes, least clearance {answer.min_clearance:.3g} m, "
-            f"seed {answer.settings.seed}.")
+            f"seed {answer.settings.seed}." + (f" Cells: {grid.describe_cells()}." if isinstance(grid, GridMap) else ""))

@@ -52,6 +52,24 @@ def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
         assert figure in out
 
 
+def test_unknown_space_that_counts_as_free_is_warned_about(hall, capsys):
+    """A mapped room of 10 m with unknown space around, saved by map_saver and loaded with its own default of free_thresh."""
+    grey = np.full((120, 120), 205, np.uint8)
+    grey[10:110, 10:110] = 254
+    Path("slam.pgm").write_bytes(b"P5\n120 120\n255\n" + grey.tobytes())
+    Path("slam.yaml").write_text("image: slam.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+                                 "free_thresh: 0.25\n")
+    request = ["slam.yaml", "--start", "5", "5", "0", "--goal", "11.5", "5", "0", *BUDGET]
+    status, out, error = run(*request, capsys=capsys)
+    assert status == 0 and "Cells: 100.0% free, 0.0% occupied, 0.0% unknown." in out
+    assert error.startswith("dubins_rrt: warning: slam.yaml: 30.56% of the cells have the grey 205") and error.count("\n") == 1
+    status, out, error = run(*request, "--unknown-grey", "205", "--json", "plan.json", capsys=capsys)
+    assert status == 1 and error.startswith("206 GOAL_OCCUPIED: ") and error.count("\n") == 1
+    status, out, error = run("--replay", "plan.json", "--unknown-grey", "205", capsys=capsys)
+    assert status == 1 and error.startswith("206 GOAL_OCCUPIED: ")
+    assert "unknown_grey is 300" in refusal(*request, "--unknown-grey", "300", capsys=capsys)
+
+
 @pytest.mark.parametrize(("flags", "needs_samples"), [([], False), (["--no-informed", "--no-shortcut"], True)])
 def test_rrt_needs_samples_only_where_hybrid_a_star_is_left_out(hall, flags, needs_samples, capsys):
     status, out, _ = run(hall, *REQUEST, *BUDGET, "--planner", "rrt", "--samples", "9000", *flags, "--json", "-", capsys=capsys)

@@ -38,7 +38,7 @@ def folder(tmp_path_factory):
 
 def test_the_documents_are_good_before_they_are_spoiled(folder):
     (folder / "good.json").write_text(json.dumps(PLAN))
-    assert read_replay(str(folder / "good.json"), 10_000).path.curves[1].word == "RLR"
+    assert read_replay(str(folder / "good.json"), max_map_cells=10_000).path.curves[1].word == "RLR"
     (folder / "good.json").write_text(json.dumps([CASE]))
     assert read_cases(str(folder / "good.json"))[0].vehicle == Vehicle()
 
@@ -55,7 +55,7 @@ def test_problems(folder, content):
 @given(content=json_of([PLAN]))
 def test_replay(folder, content):
     (folder / "plan.json").write_bytes(content)
-    request = read_or_refused(lambda: read_replay(str(folder / "plan.json"), 10_000),
+    request = read_or_refused(lambda: read_replay(str(folder / "plan.json"), max_map_cells=10_000),
                               UsageError, PlanFileError, OptionError, InvalidPose, MapError)
     assert request is None or request.path is None or isinstance(request.path, Path)
 

@@ -48,7 +48,8 @@ GEOJSONS = [json.loads((MAPS / "block.geojson").read_text()),
 def image_or_refused(content):
     found = read_or_refused(lambda: read_image(io.BytesIO(content), MAX_CELLS), MapError)
     if found is not None:
-        grey, transparent = found
+        grey, transparent, colours = found
+        assert len(colours) <= 6
         assert 1 <= grey.size <= MAX_CELLS
         assert transparent is None or transparent.shape == grey.shape
 

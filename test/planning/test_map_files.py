@@ -1,6 +1,7 @@
 """Map files: map_server's fields by Jazzy's rules, saving, the shipped maps; a helpful line for every bad file."""
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from support.images import pgm
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
 from dubins_rrt_ros.planning.maps.files import load_map
 from dubins_rrt_ros.planning.maps.grids import save_map
-from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, Thresholds, rasterise
+from dubins_rrt_ros.planning.option import OptionError
 from dubins_rrt_ros.planning.text import LONGEST
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -97,6 +99,39 @@ def test_raw_takes_the_value_and_ignores_negate_and_thresholds(tmp_path):
 
 def test_one_in_a_raw_image_is_one_percent(tmp_path):
     assert load_map(write_grid(tmp_path, [[0, 1, 255]], mode="raw")).data.tolist() == [[0, 1, -1]]
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale"])
+def test_unknown_space_that_is_free_by_its_threshold_is_told(tmp_path, mode):
+    path = write_grid(tmp_path, [[205, 0, 254, 254]], free_thresh="0.25", mode=mode)
+    grid = load_map(path)
+    assert grid.data.tolist() == [[0, 100, 0, 0]] and len(grid.warnings) == 1
+    for part in ("25.00%", "grey 205", "free_thresh: 0.25", "set free_thresh: 0.196", "--unknown-grey 205"):
+        assert part in grid.warnings[0]
+    assert grid.describe_cells() == "75.0% free, 25.0% occupied, 0.0% unknown"
+    for again in (pickle.loads(pickle.dumps(grid)), grid.with_thresholds(Thresholds(10, 90))):
+        assert again.warnings == grid.warnings
+    taken = load_map(path, unknown_grey=205)
+    assert taken.data.tolist() == [[-1, 100, 0, 0]] and taken.warnings == ()
+    assert taken.describe_cells() == "50.0% free, 25.0% occupied, 25.0% unknown"
+
+
+@pytest.mark.parametrize("rows, changes", [
+    ([[205, 0, 254]], {}), ([[204, 0, 254]], {"free_thresh": "0.25"}), ([[205, 100]], {"mode": "raw", "free_thresh": "0.25"}),
+    ([[205, 0]], {"negate": "1", "free_thresh": "0.25"})])
+def test_unknown_space_that_is_not_free_is_not_told(tmp_path, rows, changes):
+    assert load_map(write_grid(tmp_path, rows, **changes)).warnings == ()
+
+
+def test_the_grey_of_unknown_space_holds_in_all_modes(tmp_path):
+    for mode, expected in (("trinary", [-1, 0]), ("scale", [-1, 0]), ("raw", [-1, -1])):
+        assert load_map(write_grid(tmp_path, [[7, 254]], mode=mode), unknown_grey=7).data.tolist() == [expected]
+
+
+@pytest.mark.parametrize("value", [256, -2, 1.5, "205", True])
+def test_a_grey_that_is_none_is_refused(tmp_path, value):
+    with pytest.raises(OptionError, match="unknown_grey is .*; it takes an integer from -1 to 255"):
+        load_map(write_grid(tmp_path), unknown_grey=value)
 
 
 @pytest.mark.parametrize("mode, expected", [

@@ -17,7 +17,7 @@ ROW = np.array([[0, 100, 205, 254]])
 
 def read(content, max_cells=10_000):
     """Brightness and transparency as lists."""
-    grey, transparent = read_image(io.BytesIO(content), max_cells)
+    grey, transparent, _ = read_image(io.BytesIO(content), max_cells)
     assert grey.dtype == np.uint8
     assert transparent is None or (transparent.dtype, transparent.shape) == (bool, grey.shape)
     return grey.tolist(), None if transparent is None else transparent.tolist()
@@ -42,7 +42,7 @@ def test_pgm(content):
 @pytest.mark.parametrize("maxval", [1, 4, 100, 254, 1000, 65535])
 def test_pgm_is_scaled_by_its_maxval(maxval):
     samples = np.arange(maxval + 1)[None]
-    grey, _ = read_image(io.BytesIO(pgm(samples, maxval)), 10**6)
+    grey, *_ = read_image(io.BytesIO(pgm(samples, maxval)), 10**6)
     assert np.abs(grey - samples * 255 / maxval).max() <= 0.51
     plain = b"P2 %d 1 %d " % (maxval + 1, maxval) + b" ".join(b"%d" % i for i in range(maxval + 1))
     assert (read_image(io.BytesIO(plain), 10**6)[0] == grey).all()

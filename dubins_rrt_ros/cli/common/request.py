@@ -2,20 +2,26 @@
 
 import argparse
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import Map, MapNotFound, Problem, Settings, load_map
+from dubins_rrt_ros.planning import GridMap, Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
+from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
+from dubins_rrt_ros.planning.text import one_line
 
 from .documents import read_json
 from .parser import near_miss
+
+#: The arguments of load_map that have flags.
+MAP_FLAGS = ("max_map_cells", "unknown_grey")
 
 
 class LoadedRequest(NamedTuple):
@@ -43,7 +49,14 @@ def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
                                  help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"maximum number of cells of a grid; default {MAX_MAP_CELLS}")
+    parser.add_argument("--unknown-grey", metavar="N", type=int, default=UNKNOWN_GREY.default,
+                        help=f"{UNKNOWN_GREY.describe()}; default {UNKNOWN_GREY.default}")
     return action
+
+
+def map_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the keyword arguments of load_map that the flags of `add_map_arguments` give."""
+    return {name: getattr(arguments, name) for name in MAP_FLAGS}
 
 
 def find_map_or_suggest(name: str) -> Path:
@@ -60,13 +73,24 @@ def find_map_or_suggest(name: str) -> Path:
         raise MapNotFound(f"{error}{near_miss(Path(name).stem, own.values())}") from None
 
 
-def read_map(name: str, max_map_cells: int) -> tuple[Map, float]:
-    """Load the map of a file or of an installed map's name; return it with the time that this took [s]."""
+def read_map(name: str, **options: Any) -> tuple[Map, float]:
+    """Load the map of a file or of an installed map's name; return it with the time that this took [s].
+
+    What a person should know of how it was understood goes to standard error.
+
+    Args:
+        name: as `find_map` takes it.
+        **options: those of `load_map`.
+    """
     begin = time.perf_counter()
-    return load_map(find_map_or_suggest(name), max_map_cells=max_map_cells), time.perf_counter() - begin
+    loaded = load_map(find_map_or_suggest(name), **options)
+    took = time.perf_counter() - begin
+    for warning in loaded.warnings if isinstance(loaded, GridMap) else ():
+        print(f"dubins_rrt: warning: {one_line(name)}: {warning}", file=sys.stderr)
+    return loaded, took
 
 
-def read_replay(file: str, max_map_cells: int) -> LoadedRequest:
+def read_replay(file: str, **options: Any) -> LoadedRequest:
     """Read the request of a file that `dubins_rrt plan --json` wrote.
 
     Raises:
@@ -74,7 +98,7 @@ def read_replay(file: str, max_map_cells: int) -> LoadedRequest:
         PlanFileError: it is no such file, or its map is missing or has changed.
     """
     document = _read_document(file)
-    world_map, load_time = _same_map(file, document, max_map_cells)
+    world_map, load_time = _same_map(file, document, options)
     try:
         problem, settings = read_request(document, world_map)
         path = read_path(document)
@@ -90,11 +114,11 @@ def _read_document(file: str) -> dict[str, Any]:
     return document
 
 
-def _same_map(file: str, document: dict[str, Any], max_map_cells: int) -> tuple[Map, float]:
+def _same_map(file: str, document: dict[str, Any], options: dict[str, Any]) -> tuple[Map, float]:
     """Load the first map that has the name and the content of the document's."""
     others = []
     for candidate in _candidates(file, document["map"]):
-        world_map, load_time = read_map(str(candidate), max_map_cells)
+        world_map, load_time = read_map(str(candidate), **options)
         if world_map.id == document["map_id"]:
             return world_map, load_time
         others.append(f"{candidate} has the id {world_map.id}")

@@ -2,15 +2,20 @@
 
 import os
 
+from ..option import Option
 from .errors import MapError
 from .locate import find_own
 from .model import GridMap, PolygonMap
 from .opening import MAX_MAP_CELLS, ReadOptions, check_inside, located
-from .readers import MAP_ENDINGS, OTHER_ENDINGS, READERS, Reader
+from .readers import MAP_ENDINGS, OTHER_ENDINGS, READERS, Read
+
+#: The grey of unknown pixels as an option, for flags, too.
+UNKNOWN_GREY = Option("unknown_grey", int, -1, "", -1, 255, (), "brightness of pixels that are unknown cells, whatever the "
+                      "thresholds say, such as 205; -1 is none", None)
 
 
 def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS,
-             map_directory: str = "") -> GridMap | PolygonMap:
+             map_directory: str = "", unknown_grey: int = -1) -> GridMap | PolygonMap:
     """Load a map file; its ending says what it is.
 
     `.yaml`, `.yml`: map_server's format, by the rules of ROS 2 Jazzy. `.geojson`, `.json`: see
@@ -21,26 +26,29 @@ def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS
         max_map_cells: maximum number of cells of a grid; judged before its image is read. Of polygons, 64 KiB and 32 bytes for
             each cell may be read, and 64 MiB at most.
         map_directory: the directory in which the file must be, and the image that it names, when links are followed; "" is any.
+        unknown_grey: the brightness of pixels that are unknown cells, whatever the thresholds say, such as 205; -1 for none.
 
     Returns:
-        A map in metres; its name is the file's.
+        A map in metres; its name is the file's. Of a grid, `warnings` has what a person should know of how it was understood.
 
     Raises:
         MapNotFound: the file, or the image that it names, is not there, cannot be opened or is outside `map_directory`.
         MapMetadataError: the YAML file is none, or a field in it is missing or wrong.
+        OptionError: unknown_grey is out of range.
         MapError: anything else in the files cannot be used. The message names file, field, value and remedy.
     """
+    options = ReadOptions(max_map_cells, map_directory, UNKNOWN_GREY.convert(unknown_grey))
     file = find_own(path)
     try:
         check_inside(file, map_directory)
-        return _reader_of(file.suffix.lower()).read(file, ReadOptions(max_map_cells, map_directory))
+        return _reader_of(file.suffix.lower())(file, options)
     except MapError as error:
         raise located(file, error) from None
 
 
-def _reader_of(ending: str) -> Reader:
+def _reader_of(ending: str) -> Read:
     reader = READERS.get(OTHER_ENDINGS.get(ending, ending))
     if reader is None:
         *most, last = MAP_ENDINGS
         raise MapError(f"the ending {ending!r} is of no known kind of map; give a {', '.join(most)} or {last} file")
-    return reader
+    return reader.read

@@ -10,25 +10,17 @@ import numpy as np
 import yaml
 
 from ..text import quoted
+from .brightness import FREE_GREY, MODES, OCCUPIED_GREY, UNKNOWN_GREY, Rules, cells_of
 from .errors import MapError, MapMetadataError
-from .images import read_image
-from .model import (
-    FREE,
-    OCCUPIED,
-    UNKNOWN,
-    GridMap,
-)
+from .images import Picture, read_image
+from .model import GridMap
 from .opening import ReadOptions, check_inside, located, opened, read_text
 from .yaml import RepeatedKey, load_plain
 
 #: Longest YAML file that is read [bytes].
 MAX_YAML_BYTES = 16 * 2**10
 
-MODES = ("trinary", "scale", "raw")
 _FLAGS = {**dict.fromkeys(("0", "false", "no", "off"), False), **dict.fromkeys(("1", "true", "yes", "on"), True)}
-#: The brightness that trinary files have for free, occupied and unknown cells, and the thresholds that tell them apart.
-_FREE_GREY, _OCCUPIED_GREY, _UNKNOWN_GREY = 254, 0, 205
-_SAVED_OCCUPIED_THRESH, _SAVED_FREE_THRESH = 0.65, 0.196
 
 
 def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
@@ -39,13 +31,13 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
     Raises:
         MapError: the name has another ending, or a file cannot be written.
     """
-    path = Path(yaml_path)
+    path, rules = Path(yaml_path), Rules()
     image = path.with_suffix(".pgm")
-    fields = {"image": image.name, "mode": "trinary", "resolution": grid.resolution, "origin": list(grid.origin),
-              "negate": 0, "occupied_thresh": _SAVED_OCCUPIED_THRESH, "free_thresh": _SAVED_FREE_THRESH}
-    grey = np.full(grid.data.shape, _UNKNOWN_GREY, np.uint8)
-    grey[(grid.data >= 0) & (grid.data <= grid.thresholds.free_up_to)] = _FREE_GREY
-    grey[grid.data >= grid.thresholds.occupied_from] = _OCCUPIED_GREY
+    fields = {"image": image.name, "mode": rules.mode, "resolution": grid.resolution, "origin": list(grid.origin),
+              "negate": int(rules.negate), "occupied_thresh": rules.occupied_thresh, "free_thresh": rules.free_thresh}
+    grey = np.full(grid.data.shape, UNKNOWN_GREY, np.uint8)
+    grey[(grid.data >= 0) & (grid.data <= grid.thresholds.free_up_to)] = FREE_GREY
+    grey[grid.data >= grid.thresholds.occupied_from] = OCCUPIED_GREY
     height, width = grid.data.shape
     try:
         if path.suffix not in (".yaml", ".yml"):
@@ -76,15 +68,16 @@ def load_grid(path: Path, options: ReadOptions) -> GridMap:
         raise MapMetadataError(f"free_thresh is {free} and occupied_thresh {occupied}; make free_thresh the smaller one")
     try:
         check_inside(path.parent / image, options.directory)
-        with opened(path.parent / image) as file:
-            grey, transparent = read_image(file, options.max_map_cells)
+        picture = _read_picture(path.parent / image, options)
     except MapError as error:
         raise type(error)(f"image {image!r} {error}") from None
-    # Row 0 of an image is the top, of a grid the bottom.
-    data = _cell_values(mode, negate, occupied, free)[grey[::-1]]
-    if transparent is not None and mode != "raw":
-        data[transparent[::-1]] = UNKNOWN
-    return GridMap(data, resolution, origin, path.name, percent=True)
+    cells, warnings = cells_of(picture, Rules(mode, negate, occupied, free), options.unknown_grey)
+    return GridMap(cells, resolution, origin, path.name, percent=True, warnings=warnings)
+
+
+def _read_picture(path: Path, options: ReadOptions) -> Picture:
+    with opened(path) as file:
+        return read_image(file, options.max_map_cells)
 
 
 def _parse_yaml(text: str) -> dict[str, Any]:
@@ -150,24 +143,3 @@ def _pose(value: Any) -> tuple[float, float, float]:
 
 def _mode(value: Any) -> str:
     return MODES[MODES.index(value.lower())]
-
-
-def _cell_values(mode: str, negate: bool, occupied: float, free: float) -> np.ndarray:
-    """(256,) int8: the cell that each brightness stands for.
-
-    Jazzy compares in single precision, both thresholds inclusive, and rounds halves away from zero; raw knows neither
-    `negate` nor thresholds.
-    """
-    grey = np.arange(256)
-    if mode == "raw":
-        return np.where(grey <= OCCUPIED, grey, UNKNOWN).astype(np.int8)
-    shade = grey.astype(np.float32) / np.float32(255)
-    occupancy = shade if negate else np.float32(1) - shade
-    between: np.ndarray | int = UNKNOWN
-    if mode == "scale":
-        scaled = (occupancy - np.float32(free)) / np.float32(occupied - free) * np.float32(100)
-        between = np.floor(scaled.astype(float) + 0.5)
-    values = np.where(occupancy >= np.float32(occupied), OCCUPIED, between)
-    return np.where(occupancy <= np.float32(free), FREE, values).astype(np.int8)
-
-

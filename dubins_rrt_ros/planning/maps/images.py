@@ -4,8 +4,9 @@ import io
 import re
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Iterator
-from typing import BinaryIO
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from PIL import BmpImagePlugin, Image, PngImagePlugin
@@ -18,6 +19,11 @@ MAX_PLAIN_PGM_BYTES, PLAIN_PGM_BYTES_PER_PIXEL = 64 * 2**20, 16
 MAX_PGM_HEADER_BYTES = 64 * 2**10
 #: What the chunks of a PNG may take beyond twice the bytes of its pixels [bytes].
 PNG_SLACK = 2**20
+
+#: Largest difference between red, green and blue of a shade of grey.
+GREY_CHROMA = 16
+#: Maximum number of colours that are listed, and of pixels that are looked at for them.
+MAX_COLOURS, MAX_COLOURED_PIXELS = 6, 1_000_000
 
 _GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
 _PGM_HEADER = re.compile(rb"P([25])" + 3 * (_GAP + rb"+(\d{1,9})") + _GAP)
@@ -35,18 +41,28 @@ _PNG_PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2,
 _PILLOW_ERRORS = (OSError, SyntaxError, ValueError, TypeError, LookupError, OverflowError, EOFError, struct.error)
 
 
-def read_image(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the brightness and the transparency of an image.
+class Picture(NamedTuple):
+    """The pixels of an image.
+
+    Attributes:
+        grey: (height, width) uint8 brightness, the top row first.
+        transparent: (height, width) bool, true where a pixel is not fully opaque; None where the image has no transparency.
+        colours: the brightness of the most frequent colours that are no shades of grey, by (red, green, blue).
+    """
+
+    grey: np.ndarray
+    transparent: np.ndarray | None = None
+    colours: Mapping[tuple[int, int, int], int] = MappingProxyType({})
+
+
+def read_image(file: BinaryIO, max_cells: int) -> Picture:
+    """Return the pixels of an image.
 
     As for map_server, brightness has 8 bits: 16 bits are rounded, colours weighted by Rec. 601.
 
     Args:
         file: a PGM (P2, P5), PNG or BMP, recognised by its content; at its start.
         max_cells: maximum number of pixels, checked by the header before any are read.
-
-    Returns:
-        (height, width) uint8 brightness, the top row first, and (height, width) bool, true where a pixel is not fully
-        opaque; None where the image has no transparency.
 
     Raises:
         MapError: the image cannot be read, or is too large.
@@ -56,7 +72,7 @@ def read_image(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray |
     if not magic:
         raise MapError("is empty; save it again")
     if magic.startswith((b"P2", b"P5")):
-        return _read_pgm(file, max_cells), None
+        return Picture(_read_pgm(file, max_cells))
     if magic == _PNG_SIGNATURE:
         return _read_png(file, max_cells)
     if magic.startswith(b"BM"):
@@ -113,7 +129,7 @@ def _to_8_bits(samples: np.ndarray) -> np.ndarray:
     return ((samples.astype(np.uint32) + 128) // 257).astype(np.uint8)
 
 
-def _read_png(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | None]:
+def _read_png(file: BinaryIO, max_cells: int) -> Picture:
     start = file.read(_PNG_START.size)
     if len(start) < _PNG_START.size or start[12:16] != b"IHDR":
         raise _damaged("it has no header")
@@ -184,7 +200,7 @@ def _inflated_bytes(parts: Iterable[bytes], enough: int) -> int:
         raise _damaged(error) from None
 
 
-def _read_bmp(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | None]:
+def _read_bmp(file: BinaryIO, max_cells: int) -> Picture:
     header, compression = _BMP_START.unpack(file.read(_BMP_START.size).ljust(_BMP_START.size, b"\0"))
     file.seek(0)
     if header > _BMP_LONGEST_HEADER:
@@ -196,29 +212,46 @@ def _read_bmp(file: BinaryIO, max_cells: int) -> tuple[np.ndarray, np.ndarray | 
 
 
 def _read_with_pillow(reader: Callable[[BinaryIO], Image.Image], file: BinaryIO, max_cells: int,
-                      depth: int) -> tuple[np.ndarray, np.ndarray | None]:
+                      depth: int) -> Picture:
     # Not Image.open: its guard against huge images warns or raises by a limit that is global. Here it is `max_cells`.
     try:
         image = reader(file)
         _check_size(*image.size, max_cells)
         image.load()
-        return _grey_and_transparency(image, depth)
+        return _picture(image, depth)
     except MapError:
         raise
     except _PILLOW_ERRORS as error:
         raise _damaged(error) from None
 
 
-def _grey_and_transparency(image: Image.Image, depth: int) -> tuple[np.ndarray, np.ndarray | None]:
+def _picture(image: Image.Image, depth: int) -> Picture:
     transparent = image.info.get("transparency")
     if image.mode.startswith("I"):
         samples = np.asarray(image)
-        return _to_8_bits(samples), None if transparent is None else samples == transparent
+        return Picture(_to_8_bits(samples), None if transparent is None else samples == transparent)
     if image.mode in ("1", "L"):
         grey = np.asarray(image.convert("L"))
         # Pillow scales the samples to 8 bits, but the transparent one not, or not in every version.
-        return grey, None if transparent is None else grey == min(transparent * 255 // (2**depth - 1), 255)
+        return Picture(grey, None if transparent is None else grey == min(transparent * 255 // (2**depth - 1), 255))
     if image.mode == "P" or (transparent is not None and "A" not in image.getbands()):
         image = image.convert("RGB" if transparent is None else "RGBA")
     transparency = np.asarray(image.getchannel("A")) < 255 if "A" in image.getbands() else None
-    return np.asarray(image.convert("L")), transparency
+    grey = np.asarray(image.convert("L"))
+    return Picture(grey, transparency, _colours(image, grey, transparency))
+
+
+def _colours(image: Image.Image, grey: np.ndarray, transparent: np.ndarray | None) -> dict[tuple[int, int, int], int]:
+    """Return the brightness of the most frequent colours of opaque pixels that are no shades of grey, by (red, green, blue)."""
+    if "R" not in image.getbands():
+        return {}
+    red, green, blue = (np.asarray(image.getchannel(band)) for band in "RGB")
+    coloured = np.maximum(np.maximum(red, green), blue) - np.minimum(np.minimum(red, green), blue) > GREY_CHROMA
+    if transparent is not None:
+        coloured &= ~transparent
+    at = np.flatnonzero(coloured)
+    at = at[::1 + len(at) // MAX_COLOURED_PIXELS]
+    colours = np.stack([band.ravel()[at] for band in (red, green, blue, grey)], axis=1)
+    found, count = np.unique(colours, axis=0, return_counts=True)
+    most = found[np.argsort(-count, kind="stable")[:MAX_COLOURS]].tolist()
+    return {(r, g, b): brightness for r, g, b, brightness in most}

@@ -3,7 +3,7 @@
 import hashlib
 import math
 from collections.abc import Iterable
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -34,6 +34,10 @@ class Thresholds(NamedTuple):
         """Take map_server's fractions, both inclusive."""
         return cls(math.floor(100 * free_thresh + 1e-9), math.ceil(100 * occupied_thresh - 1e-9))
 
+    def meaning(self, value: int) -> str:
+        """Return what a cell's value means: free, occupied or unknown."""
+        return "occupied" if value >= self.occupied_from else "free" if 0 <= value <= self.free_up_to else "unknown"
+
     def blocked(self, data: np.ndarray, allow_unknown: bool) -> np.ndarray:
         """Return (height, width) bool: which cells of a grid's data are obstacles."""
         if allow_unknown:
@@ -58,6 +62,7 @@ class GridMap:
         origin: (x [m], y [m], yaw [rad]) of the outer corner of cell (0, 0) in the map's frame.
         name: where it came from, for messages.
         thresholds: which of these values are free, and which occupied.
+        warnings: what a person should know of how the file was understood, one line each.
         percent: take 1 as 1 % even if there is no cell above it. Without this such a grid is refused, since 1 is often meant to
             be an obstacle.
 
@@ -72,6 +77,7 @@ class GridMap:
     name: str = "grid"
     percent: InitVar[bool] = False
     thresholds: Thresholds = field(default=DEFAULT_THRESHOLDS, kw_only=True)
+    warnings: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self, percent: bool) -> None:
         _check_name(self.name)
@@ -95,6 +101,13 @@ class GridMap:
     def blocked(self, allow_unknown: bool) -> np.ndarray:
         """Return (height, width) bool: the cells that are obstacles."""
         return self.thresholds.blocked(self.data, allow_unknown)
+
+    def describe_cells(self) -> str:
+        """Return the shares of free, occupied and unknown cells in words."""
+        cells = self.data.size
+        free = cells - np.count_nonzero(self.blocked(allow_unknown=False))
+        occupied = np.count_nonzero(self.blocked(allow_unknown=True))
+        return f"{free / cells:.1%} free, {occupied / cells:.1%} occupied, {(cells - free - occupied) / cells:.1%} unknown"
 
     @property
     def size(self) -> tuple[float, float]:
@@ -120,7 +133,7 @@ class GridMap:
 
     def with_thresholds(self, thresholds: Thresholds) -> "GridMap":
         """Return the map with the same cells, whose values are taken otherwise."""
-        return GridMap(self.data, self.resolution, self.origin, self.name, percent=True, thresholds=thresholds)
+        return replace(self, percent=True, thresholds=thresholds)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the map, counter-clockwise, in the map's frame [m]; read-only."""
@@ -139,7 +152,8 @@ class GridMap:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Made anew, so that its cells are read-only again.
-        return partial(GridMap, percent=True, thresholds=self.thresholds), (self.data, self.resolution, self.origin, self.name)
+        make = partial(GridMap, percent=True, thresholds=self.thresholds, warnings=self.warnings)
+        return make, (self.data, self.resolution, self.origin, self.name)
 
 
 @dataclass(frozen=True, eq=False)

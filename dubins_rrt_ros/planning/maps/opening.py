@@ -19,10 +19,12 @@ class ReadOptions(NamedTuple):
     Attributes:
         max_map_cells: maximum number of cells of a grid.
         directory: the directory in which files must be, when links are followed; "" is any.
+        unknown_grey: the brightness of unknown cells, whatever the thresholds say; -1 for none.
     """
 
     max_map_cells: int = MAX_MAP_CELLS
     directory: str = ""
+    unknown_grey: int = -1
 
 
 def expand_home(path: str | os.PathLike[str]) -> Path:

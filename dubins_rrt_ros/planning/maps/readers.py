@@ -14,6 +14,8 @@ MAX_POLYGON_BYTES = 64 * 2**20
 #: Length of polygon files that is allowed however few cells a map may have, and the length for each cell: that of a position.
 _FEW_POLYGON_BYTES, _POLYGON_BYTES_PER_CELL = 64 * 2**10, 32
 
+Read = Callable[[Path, ReadOptions], GridMap | PolygonMap]
+
 
 class Reader(NamedTuple):
     """A reader of one kind of map file.
@@ -23,7 +25,7 @@ class Reader(NamedTuple):
         is_grid: True if its maps are grids; all others are polygons.
     """
 
-    read: Callable[[Path, ReadOptions], GridMap | PolygonMap]
+    read: Read
     is_grid: bool
 
 
