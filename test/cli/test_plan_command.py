@@ -70,6 +70,17 @@ def test_unknown_space_that_counts_as_free_is_warned_about(hall, capsys):
     assert "unknown_grey is 300" in refusal(*request, "--unknown-grey", "300", capsys=capsys)
 
 
+def test_a_picture_without_a_yaml_file_is_planned_on(hall, capsys):
+    grey = np.full((100, 200), 254, np.uint8)
+    grey[40:, 100] = 0  # a wall from below, with a way around it above
+    Path("hall.pgm").write_bytes(b"P5\n200 100\n255\n" + grey.tobytes())
+    request = ["hall.pgm", "--start", "1", "1", "0", "--goal", "9", "1", "0", "--robot-radius", "0.2", *BUDGET]
+    status, _, error = run(*request, "--resolution", "0.05", "--json", "plan.json", capsys=capsys)
+    assert status == 0 and error == "" and 9 < json.loads(Path("plan.json").read_text())["length"] < 12
+    assert run("--replay", "plan.json", "--resolution", "0.05", capsys=capsys)[0] == 0
+    assert "--resolution 0.05" in refusal(*request, capsys=capsys)
+
+
 @pytest.mark.parametrize(("flags", "needs_samples"), [([], False), (["--no-informed", "--no-shortcut"], True)])
 def test_rrt_needs_samples_only_where_hybrid_a_star_is_left_out(hall, flags, needs_samples, capsys):
     status, out, _ = run(hall, *REQUEST, *BUDGET, "--planner", "rrt", "--samples", "9000", *flags, "--json", "-", capsys=capsys)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from support.images import pgm
+from support.images import pgm, row_of
 
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
 from dubins_rrt_ros.planning.maps.files import load_map
@@ -20,6 +20,7 @@ from dubins_rrt_ros.planning.text import LONGEST
 MAPS = Path(__file__).parents[2] / "maps"
 FIELDS = {"image": "m.pgm", "resolution": "0.05", "origin": "[0, 0, 0]", "negate": "0",
           "occupied_thresh": "0.65", "free_thresh": "0.196"}
+RED, BLUE, GREEN, YELLOW, WHITE = (255, 0, 0), (0, 0, 255), (0, 255, 0), (255, 255, 0), (255, 255, 255)
 REMEDIES = ("give", "save", "correct", "name ", "make", "convert", "crop", "copy", "split", "mark", "choose")
 
 
@@ -99,6 +100,54 @@ def test_raw_takes_the_value_and_ignores_negate_and_thresholds(tmp_path):
 
 def test_one_in_a_raw_image_is_one_percent(tmp_path):
     assert load_map(write_grid(tmp_path, [[0, 1, 255]], mode="raw")).data.tolist() == [[0, 1, -1]]
+
+
+def picture(folder, *colours, mode="RGB"):
+    row_of(mode, *colours).save(folder / "m.png")
+    return folder / "m.png"
+
+
+def test_what_the_colours_of_a_picture_became_is_told(tmp_path):
+    path = write_grid(tmp_path, name="m.png")
+    picture(tmp_path, RED, BLUE, BLUE, GREEN, YELLOW, WHITE, (0, 0, 0), (200, 205, 210))
+    grid = load_map(path)
+    assert grid.data.tolist() == [[100, 100, 100, -1, 0, 0, 100, -1]]
+    assert len(grid.warnings) == 1
+    for part in ("(0, 0, 255) became occupied, ", "(255, 0, 0) became occupied", "(0, 255, 0) became unknown",
+                 "(255, 255, 0) became free", "draw obstacles black"):
+        assert part in grid.warnings[0]
+    assert "200" not in grid.warnings[0]
+
+
+def test_what_is_transparent_has_no_colour(tmp_path):
+    path = write_grid(tmp_path, name="m.png")
+    picture(tmp_path, (*RED, 0), (*WHITE, 255), mode="RGBA")
+    assert load_map(path).warnings == () and load_map(path).data.tolist() == [[-1, 0]]
+
+
+def test_of_many_colours_the_most_frequent_are_told(tmp_path):
+    path = write_grid(tmp_path, name="m.png")
+    picture(tmp_path, *((n, 255, 0) for n in range(60)), *[BLUE] * 3)
+    assert load_map(path).warnings[0].count("became") == 6 and "(0, 0, 255) became" in load_map(path).warnings[0]
+
+
+def test_a_picture_is_a_map_where_its_resolution_is_given(tmp_path):
+    path = picture(tmp_path, 0, 89, 90, 204, 205, 206, 254, mode="L")
+    grid = load_map(path, resolution=0.05)
+    assert grid.data.tolist() == [[100, 100, -1, -1, -1, 0, 0]]
+    assert (grid.resolution, grid.origin, grid.name) == (0.05, (0, 0, 0), "m.png")
+    assert load_map(path, resolution=np.float32(0.5)).size == (3.5, 0.5)
+    assert "give the side of its cells in metres, such as resolution=0.05" in refusal(path, MapMetadataError)
+    assert "resolution is -1" in refusal(path, MapMetadataError, resolution=-1)
+    assert "max_map_cells = 3" in refusal(path, resolution=0.05, max_map_cells=3)
+    (tmp_path / "m.PGM").write_bytes(pgm([[0, 254]]))
+    assert load_map(tmp_path / "m.PGM", resolution=1).data.tolist() == [[100, 0]]
+
+
+def test_a_resolution_for_a_file_that_has_its_own_is_refused(tmp_path):
+    message = "says itself how large its cells are, and resolution is 0.1; leave that out"
+    with pytest.raises(MapError, match=message):
+        load_map(write_grid(tmp_path), resolution=0.1)
 
 
 @pytest.mark.parametrize("mode", ["trinary", "scale"])

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from dubins_rrt_ros.planning import GridMap, Map, MapNotFound, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
 from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
+from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
@@ -21,7 +22,7 @@ from .documents import read_json
 from .parser import near_miss
 
 #: The arguments of load_map that have flags.
-MAP_FLAGS = ("max_map_cells", "unknown_grey")
+MAP_FLAGS = ("max_map_cells", "resolution", "unknown_grey")
 
 
 class LoadedRequest(NamedTuple):
@@ -49,6 +50,9 @@ def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
                                  help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"maximum number of cells of a grid; default {MAX_MAP_CELLS}")
+    parser.add_argument("--resolution", metavar="m", type=float, default=None,
+                        help=f"side of a cell of a picture ({', '.join(PICTURE_ENDINGS)}) that is the map, without a YAML file "
+                             "[m]: white is free, black occupied, grey unknown, and its lower left corner at (0, 0)")
     parser.add_argument("--unknown-grey", metavar="N", type=int, default=UNKNOWN_GREY.default,
                         help=f"{UNKNOWN_GREY.describe()}; default {UNKNOWN_GREY.default}")
     return action

@@ -4,6 +4,7 @@ import os
 
 from ..option import Option
 from .errors import MapError
+from .grids import PICTURE_ENDINGS, load_picture
 from .locate import find_own
 from .model import GridMap, PolygonMap
 from .opening import MAX_MAP_CELLS, ReadOptions, check_inside, located
@@ -15,17 +16,20 @@ UNKNOWN_GREY = Option("unknown_grey", int, -1, "", -1, 255, (), "brightness of p
 
 
 def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS,
-             map_directory: str = "", unknown_grey: int = -1) -> GridMap | PolygonMap:
+             map_directory: str = "", resolution: float | None = None, unknown_grey: int = -1) -> GridMap | PolygonMap:
     """Load a map file; its ending says what it is.
 
     `.yaml`, `.yml`: map_server's format, by the rules of ROS 2 Jazzy. `.geojson`, `.json`: see
     :func:`~dubins_rrt_ros.planning.maps.polygons.parse_geojson`. `.wkt`: one Polygon or MultiPolygon, the free space.
+    `.png`, `.pgm`, `.bmp`: a picture without a YAML file, with `resolution`; free from the grey 206 up, occupied up to 89, its
+    lower left corner at (0, 0).
 
     Args:
         path: the file, whose leading `~` is the home directory; or the name of one of the package's own maps, such as maze.
         max_map_cells: maximum number of cells of a grid; judged before its image is read. Of polygons, 64 KiB and 32 bytes for
             each cell may be read, and 64 MiB at most.
         map_directory: the directory in which the file must be, and the image that it names, when links are followed; "" is any.
+        resolution: the side of a cell of a picture without a YAML file [m]; None for all other files.
         unknown_grey: the brightness of pixels that are unknown cells, whatever the thresholds say, such as 205; -1 for none.
 
     Returns:
@@ -37,16 +41,21 @@ def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS
         OptionError: unknown_grey is out of range.
         MapError: anything else in the files cannot be used. The message names file, field, value and remedy.
     """
-    options = ReadOptions(max_map_cells, map_directory, UNKNOWN_GREY.convert(unknown_grey))
+    options = ReadOptions(max_map_cells, map_directory, UNKNOWN_GREY.convert(unknown_grey), resolution)
     file = find_own(path)
     try:
         check_inside(file, map_directory)
-        return _reader_of(file.suffix.lower())(file, options)
+        return _reader_of(file.suffix.lower(), options)(file, options)
     except MapError as error:
         raise located(file, error) from None
 
 
-def _reader_of(ending: str) -> Read:
+def _reader_of(ending: str, options: ReadOptions) -> Read:
+    if ending in PICTURE_ENDINGS:
+        return load_picture
+    if options.resolution is not None:
+        raise MapError(f"a {ending} file says itself how large its cells are, and resolution is {options.resolution:g}; leave "
+                       "that out")
     reader = READERS.get(OTHER_ENDINGS.get(ending, ending))
     if reader is None:
         *most, last = MAP_ENDINGS

@@ -17,6 +17,8 @@ from .model import GridMap
 from .opening import ReadOptions, check_inside, located, opened, read_text
 from .yaml import RepeatedKey, load_plain
 
+#: The endings of pictures, which may come without a YAML file.
+PICTURE_ENDINGS = (".png", ".pgm", ".bmp")
 #: Longest YAML file that is read [bytes].
 MAX_YAML_BYTES = 16 * 2**10
 
@@ -73,6 +75,20 @@ def load_grid(path: Path, options: ReadOptions) -> GridMap:
         raise type(error)(f"image {image!r} {error}") from None
     cells, warnings = cells_of(picture, Rules(mode, negate, occupied, free), options.unknown_grey)
     return GridMap(cells, resolution, origin, path.name, percent=True, warnings=warnings)
+
+
+def load_picture(path: Path, options: ReadOptions) -> GridMap:
+    """Load a picture that comes without a YAML file: by the default rules, its lower left corner at (0, 0).
+
+    Raises:
+        MapMetadataError: there is no resolution, or it is out of range.
+        MapError: the picture cannot be used.
+    """
+    if options.resolution is None:
+        raise MapMetadataError("is a picture; give the side of its cells in metres, such as resolution=0.05 (--resolution 0.05), "
+                               "or the YAML file that names it")
+    cells, warnings = cells_of(_read_picture(path, options), Rules(), options.unknown_grey)
+    return GridMap(cells, options.resolution, name=path.name, percent=True, warnings=warnings)
 
 
 def _read_picture(path: Path, options: ReadOptions) -> Picture:

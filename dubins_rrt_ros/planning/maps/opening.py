@@ -20,11 +20,13 @@ class ReadOptions(NamedTuple):
         max_map_cells: maximum number of cells of a grid.
         directory: the directory in which files must be, when links are followed; "" is any.
         unknown_grey: the brightness of unknown cells, whatever the thresholds say; -1 for none.
+        resolution: the side of a cell of a picture that comes without a YAML file [m]; None where files say it.
     """
 
     max_map_cells: int = MAX_MAP_CELLS
     directory: str = ""
     unknown_grey: int = -1
+    resolution: float | None = None
 
 
 def expand_home(path: str | os.PathLike[str]) -> Path:
