@@ -174,6 +174,47 @@ def test_problems_must_be_given_to_measure(capsys):
     assert "PROBLEMS.json must be given" in refusal("--out", "r", capsys=capsys)
 
 
+def test_every_option_of_vehicle_request_and_settings_is_a_key():
+    footprint = [[0.5, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.5, -0.3]]
+    wheels = {"wheelbase": 0.5, "max_steering_angle": 0.4}
+    rich = entry(name="rich", footprint=footprint, **wheels, goal_tolerance_xy=0.5, any_goal_heading=True, planner="rrt",
+                 samples=120, seed=7, shortcut=False, _why="a note", set="other")
+    bare = {key: value for key, value in rich.items() if key not in ("turning_radius", "robot_radius", "name")}
+    lines = bench(problems(rich, {"name": "bare", **bare}), "--seeds", "2", status=(0, 1))
+    assert [(line["problem"], line["seed"]) for line in lines] == [("rich", 7), ("rich", 8), ("bare", 7), ("bare", 8)]
+    vehicle = Vehicle(footprint=footprint, **wheels)
+    problem = Problem(load_map("set/hall.wkt"), vehicle, START, GOAL, goal_tolerance_xy=0.5, any_goal_heading=True)
+    for line in lines:
+        answer = plan(problem, Settings(planner="rrt", samples=120, planning_time=3600, seed=line["seed"], shortcut=False))
+        assert line["planner"] == "rrt" and line["time_limit"] == 3600
+        assert line["path"] == (answer.path.poses(0.05).tolist() if answer.path else [])
+
+
+def test_flags_come_before_what_a_problem_says():
+    file = problems(entry(planner="rrt", planning_time=9.0, seed=3))
+    line, = bench(file, "--planner", "rrt_star", "--time", "4", *BUDGET)
+    assert (line["planner"], line["time_limit"], line["seed"]) == ("rrt_star", 4, 3)
+
+
+def test_unknown_space_may_be_free_in_a_problem():
+    grid = rasterise(PolygonMap(HALL), 0.25)
+    data = grid.data.copy()
+    data[data == 0] = -1
+    save_map(type(grid)(data, grid.resolution, grid.origin), "set/hall.yaml")
+    lines = bench(problems(entry(map="hall.yaml"), entry(map="hall.yaml", name="free", allow_unknown=True)), *BUDGET, status=1)
+    assert [line["error_name"] for line in lines] == ["START_OCCUPIED", "NONE"]
+
+
+@pytest.mark.parametrize(("more", "says"), [
+    ({"foot_print": []}, "problem 1, hall: there is no key 'foot_print'; did you mean footprint?"),
+    ({"turningradius": 2}, "did you mean turning_radius?"),
+    ({"colour": "red"}, "there is no key 'colour'; give none but name, map"),
+    ({"footprint": [[1, 2]]}, "footprint is"), ({"goal_bias": 7}, "goal_bias is 7"),
+    ({"allow_unknown": "yes"}, "allow_unknown is 'yes'")])
+def test_a_key_of_which_nothing_comes_is_refused(more, says, capsys):
+    assert says in refusal(problems(entry(**more)), "--out", "runs.jsonl", capsys=capsys)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_keeps_the_lines_that_are_written(jobs):

@@ -3,7 +3,7 @@
 import argparse
 import contextlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ..common.flags import add_option_flags, given_options, largest
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
-from .problems import chosen, read_cases
+from .problems import Case, chosen, read_cases
 from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
 from .runs import BenchRun, measure_all
@@ -62,7 +62,8 @@ def add_arguments(parser: Parser) -> None:
 
 def _add_measuring(group: argparse._ArgumentGroup) -> None:
     group.add_argument("file", metavar="PROBLEMS.json", nargs="?",
-                       help="a list of {name, map (relative to the file), start, goal, turning_radius, robot_radius}")
+                       help="a list of {name, map (relative to the file), start, goal, turning_radius, robot_radius}, with any "
+                            "other option of vehicle, request or settings, and notes whose keys begin with _")
     group.add_argument("--problems", metavar="NAME[,NAME]", help="names of the problems to plan; default: all")
     group.add_argument("--seeds", metavar="N", type=int, help="number of seeds per problem, from 0 to N-1; default 1")
     group.add_argument("--time", metavar="s", type=float,
@@ -126,18 +127,27 @@ def _planned_runs(arguments: argparse.Namespace) -> list[BenchRun]:
     missing = [name for name, key in (("PROBLEMS.json", "file"), ("--out", "out")) if key not in arguments]
     if missing:
         raise UsageError(f"{' and '.join(missing)} must be given, to measure; or --report, to compare")
-    settings, seeds = _settings(arguments), range(_count(arguments, "seeds"))
     cases = read_cases(arguments.file)
     if "problems" in arguments:
         cases = chosen(cases, arguments.problems.split(","))
+    return [run for case in cases for run in _runs_of(case, arguments)]
+
+
+def _runs_of(case: Case, arguments: argparse.Namespace) -> Iterator[BenchRun]:
+    """Yield the runs of a problem, from its own seed on, or from 0."""
+    settings, seeds = _settings(arguments, dict(case.settings)), _count(arguments, "seeds")
+    first = max(settings.seed, 0)
     label = getattr(arguments, "label", settings.planner)
-    return [BenchRun(case, replace(settings, seed=seed), label) for case in cases for seed in seeds]
+    return (BenchRun(case, replace(settings, seed=seed), label) for seed in range(first, first + seeds))
 
 
-def _settings(arguments: argparse.Namespace) -> Settings:
-    given = given_options(arguments, _Flags)
-    time = getattr(arguments, "time", MAX_TIME if "samples" in given else DEFAULT_TIME)
-    return Settings(**{"samples": MAX_SAMPLES, "planning_time": time, **given})
+def _settings(arguments: argparse.Namespace, of_problem: Mapping[str, Any]) -> Settings:
+    """Return the settings of a problem's runs: flags come before what its file gives, and that before the defaults."""
+    given = dict(of_problem) | given_options(arguments, _Flags)
+    if "time" in arguments:
+        given["planning_time"] = arguments.time
+    default_time = MAX_TIME if "samples" in given else DEFAULT_TIME
+    return Settings(**{"samples": MAX_SAMPLES, "planning_time": default_time, **given})
 
 
 def _count(arguments: argparse.Namespace, name: str) -> int:

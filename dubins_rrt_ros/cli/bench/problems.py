@@ -6,13 +6,19 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Vehicle, checked_pose
+from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Problem, Settings, Vehicle, checked_pose, options
 from dubins_rrt_ros.planning.text import one_line, quoted
 
 from ..common.documents import read_json
-from ..common.parser import UsageError
+from ..common.parser import UsageError, near_miss
 
 KEYS = ("name", "map", "start", "goal", "turning_radius", "robot_radius")
+#: Keys that may be there in place of one of these.
+_IN_PLACE_OF = {"turning_radius": "wheelbase", "robot_radius": "footprint"}
+#: Keys that are notes, as all that begin with an underscore.
+NOTES = ("set", "check_step")
+
+_Options = tuple[tuple[str, Any], ...]
 
 
 class Case(NamedTuple):
@@ -23,6 +29,7 @@ class Case(NamedTuple):
         map: the file of the map.
         vehicle: turning radius and size.
         start, goal: (x [m], y [m], theta [rad]).
+        request, settings: the options of `Problem` and of `Settings` that the file gives, as pairs of name and value.
     """
 
     name: str
@@ -30,13 +37,20 @@ class Case(NamedTuple):
     vehicle: Vehicle
     start: Pose
     goal: Pose
+    request: _Options = ()
+    settings: _Options = ()
+
+    @property
+    def allow_unknown(self) -> bool:
+        """True if unknown space is free."""
+        return bool(dict(self.request).get("allow_unknown", False))
 
 
 def read_cases(file: str) -> list[Case]:
-    """Read the problems of a file; unknown keys are ignored.
+    """Read the problems of a file: every option of vehicle, request and settings may be a key; notes are passed over.
 
     Raises:
-        UsageError: the file or one of its problems is malformed, or a map is missing.
+        UsageError: the file or one of its problems is malformed, a key is unknown, or a map is missing.
     """
     entries = read_json(file)
     if not (isinstance(entries, list) and entries):
@@ -63,7 +77,7 @@ def chosen(cases: list[Case], names: Collection[str]) -> list[Case]:
 def _case(entry: Any, folder: Path, where: str) -> Case:
     if not isinstance(entry, dict):
         raise UsageError(f"{where} is no object; give one with {', '.join(KEYS)}")
-    missing = [key for key in KEYS if key not in entry]
+    missing = [key for key in KEYS if key not in entry and _IN_PLACE_OF.get(key) not in entry]
     if missing:
         raise UsageError(f"{where} lacks {', '.join(missing)}")
     for key in ("name", "map"):
@@ -72,11 +86,31 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
     where, map_file = f"{where}, {entry['name']}", folder / entry["map"]
     if not os.path.isfile(map_file):  # pathlib's is_file() raises for a name that is too long
         raise UsageError(one_line(f"{where}: there is no map file {map_file}"))
+    _check_keys(entry, where)
     try:
-        vehicle = Vehicle(turning_radius=entry["turning_radius"], robot_radius=entry["robot_radius"])
-        return Case(entry["name"], map_file, vehicle, _pose("start", entry["start"]), _pose("goal", entry["goal"]))
+        vehicle = Vehicle(**dict(_given(Vehicle, entry)))
+        return Case(entry["name"], map_file, vehicle, _pose("start", entry["start"]), _pose("goal", entry["goal"]),
+                    _given(Problem, entry), _given(Settings, entry))
     except (OptionError, InvalidPose) as error:
         raise UsageError(one_line(f"{where}: {error}")) from error
+
+
+def _check_keys(entry: dict[str, Any], where: str) -> None:
+    """Refuse a key of which nothing would come."""
+    known = dict.fromkeys((*KEYS, *(item.name for cls in (Vehicle, Problem, Settings) for item in options(cls)), *NOTES))
+    for key in entry:
+        if key not in known and not key.startswith("_"):
+            remedy = near_miss(key, known) or f"; give none but {', '.join(known)}, or begin a note with _"
+            raise UsageError(one_line(f"{where}: there is no key {quoted(key)}{remedy}"))
+
+
+def _given(cls: type, entry: dict[str, Any]) -> _Options:
+    """Return the options of a dataclass that an entry gives, as their fields hold them.
+
+    Raises:
+        OptionError: a value is of another type or out of range.
+    """
+    return tuple((item.name, item.convert(entry[item.name])) for item in options(cls) if item.name in entry)
 
 
 def _pose(name: str, numbers: Any) -> Pose:

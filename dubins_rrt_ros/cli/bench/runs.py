@@ -7,9 +7,10 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
 from multiprocessing import active_children, get_context
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, World, load_map, plan, prepare
+from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, Vehicle, World, load_map, plan, prepare
 
 from ..common.parser import UsageError
 from .problems import Case
@@ -64,8 +65,9 @@ def measure(run: BenchRun) -> dict[str, Any]:
     Raises:
         MapError: the map cannot be used.
     """
-    world, map_time = _loaded(run.case)
-    problem = Problem(world, start=run.case.start, goal=run.case.goal)
+    case = run.case
+    world, map_time = _loaded(case.map, case.vehicle, case.allow_unknown)
+    problem = Problem(world, start=case.start, goal=case.goal, **dict(case.request))
     trace: list[list[float]] = []
 
     def record(progress: Progress) -> None:
@@ -79,10 +81,10 @@ def measure(run: BenchRun) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _loaded(case: Case) -> tuple[World, float]:
+def _loaded(file: Path, vehicle: Vehicle, allow_unknown: bool) -> tuple[World, float]:
     """Load and prepare the map of a case; return it with the time taken [s]. Runs of a case follow each other: one is kept."""
     begin = time.perf_counter()
-    world = prepare(load_map(case.map), case.vehicle)
+    world = prepare(load_map(file), vehicle, allow_unknown=allow_unknown)
     return world, time.perf_counter() - begin
 
 
