@@ -170,21 +170,23 @@ class _Call:
 
     def _failed(self, search: Search, field: ClearanceField) -> Plan:
         """Return the plan of a search that ended without a path."""
+        search.wait()
         tree, drawn = search.tree, self._drawn(search.samples, search.size)
         if search.done:
-            status, what, more = Status.NO_VALID_PATH, "No path found", "samples"
+            what, more = "No path found", "samples"
         else:
-            status, what, more = Status.TIMEOUT, f"No path within planning_time {self._settings.planning_time:g} s", "time"
+            what, more = f"No path within planning_time {self._settings.planning_time:g} s", "time"
         why, location = explain.after_search(self._problem, field, tree, more)
         if search.samples == 0 and location is None:
             why = f"allow more {more}"
         elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
             why, location = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
-        return self._plan(status, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location)
+        return self._plan(Status.TIMEOUT, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location)
 
     def _drawn(self, samples: int, nodes: int) -> str:
         tree = f"{nodes} tree node{'' if nodes == 1 else 's'}"
-        return f"{samples} of {self._settings.samples} samples drawn, {tree}, {self._elapsed:.3g} s"
+        of_budget = f" of {self._settings.samples}" if samples <= self._settings.samples else ""
+        return f"{samples}{of_budget} samples drawn, {tree}, {self._elapsed:.3g} s"
 
     def _with_path(self, path: Path, tree: Tree, samples: int, *, cancelled: bool = False, running: bool = False) -> Plan:
         """Return the plan with a path, if the path passes the audit."""

@@ -125,7 +125,8 @@ class Plan:
             yield f"the message is {self.message!r}, not one line"
         if (self.status == Status.NONE) != (self.path is not None):
             yield f"the status is {self.status.name} {'without' if self.path is None else 'with'} a path"
-        if not 0 <= self.samples <= settings.samples:
+        # Informed, a search goes on beyond its budget up to a first path.
+        if self.samples < 0 or (self.samples > settings.samples and not settings.informed):
             yield f"{self.samples} samples were drawn of {settings.samples}"
         if settings.seed < 0:
             yield f"the seed that was used is {settings.seed}"

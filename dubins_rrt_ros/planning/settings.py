@@ -19,7 +19,8 @@ class Settings:
 
     planner: str = option("rrt_star", "algorithm: rrt ends with its first path, rrt_star uses its whole budget",
                           choices=("rrt", "rrt_star"))
-    samples: int = option(3000, "maximum number of samples", low=1, high=10_000_000)
+    samples: int = option(3000, "number of samples after which a search that has a path ends; the maximum with informed: false",
+                          low=1, high=10_000_000)
     planning_time: float = option(1.0, "time limit", unit="s", low=0.001, high=MAX_PLANNING_TIME)
     goal_bias: float = option(0.05, "share of the samples drawn at the goal", low=0.0, high=1.0)
     step_size: float = option(0.0, "maximum length of an edge, also when rewired; 0 is unlimited", unit="m", low=0.0, high=1e6)

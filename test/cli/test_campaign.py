@@ -13,7 +13,7 @@ from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.evaluation.campaign import judge as campaign_judge
 from dubins_rrt_ros.evaluation.campaign import problems as campaign_problems
 from dubins_rrt_ros.evaluation.campaign.judge import TrialNumber, judge
-from dubins_rrt_ros.evaluation.campaign.problems import Trial, random_trial
+from dubins_rrt_ros.evaluation.campaign.problems import AMPLE_TIME, Trial, random_trial
 from dubins_rrt_ros.evaluation.processes import run_in_processes
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, plan, planner
 from dubins_rrt_ros.planning._kernels.collision import CollisionChecker
@@ -28,7 +28,7 @@ def walled_trial(fits=None, start=START, turning_radius=0.5, walled_off=False, *
     data = np.zeros((14, 20))
     data[:14 if walled_off else 10, 9:11] = 100
     problem = Problem(GridMap(data, 0.5), Vehicle(turning_radius, 0.4), start, GOAL)
-    return Trial("walled", problem, Settings(**{"samples": 60, "planning_time": 60.0, "seed": 1, **settings}), fits)
+    return Trial("walled", problem, Settings(**{"samples": 60, "planning_time": AMPLE_TIME, "seed": 1, **settings}), fits)
 
 
 def findings_of(trial, monkeypatch, number=0):
@@ -105,8 +105,8 @@ def test_a_collision_check_that_is_too_strict_is_found(monkeypatch):
     (Status.GOAL_OCCUPIED, "Goal is occupied.", "GOAL_OCCUPIED, but the vehicle has "),
     (Status.START_OUTSIDE_MAP, "Start is outside.", "START_OUTSIDE_MAP, but it is in the map"),
     (Status.NO_VALID_PATH, "No path exists: walls.", "a way leads from start to goal, but: No path exists: walls."),
-    (Status.NO_VALID_PATH, "No path found: yet.", "it gave up after 0 of 60 samples"),
-    (Status.TIMEOUT, "No time.", "s, the limit being 60 s"),
+    (Status.TIMEOUT, "No path found: yet.", "it gave up after 0 of 60 samples"),
+    (Status.TIMEOUT, "No time.", "s, the limit being 1 s"),
     (Status.UNKNOWN, "A defect.", "UNKNOWN: A defect."),
 ])
 def test_a_false_status_is_found(status, message, finding, monkeypatch):
@@ -128,7 +128,7 @@ def test_what_the_maker_of_a_problem_knows_counts(monkeypatch):
     found, = findings_of(walled_trial(fits=True, walled_off=True), monkeypatch)
     assert found.startswith("a way leads from start to goal, but: No path exists: walls separate ")
     found, = findings_of(walled_trial(fits=True, start=(7.0, 1.0, 0.0), turning_radius=9.0), monkeypatch)
-    assert found.startswith("the shortest curve leads to the goal, but: No path found: 60 of 60 samples drawn")
+    assert found.startswith("the shortest curve leads to the goal, but: No path within planning_time 1 s: ")
 
 
 def test_an_exception_is_found_and_told_with_the_command_that_repeats_it(monkeypatch, capsys):

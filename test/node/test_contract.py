@@ -55,7 +55,7 @@ STATUSES = [
     (206, "GOAL_OCCUPIED", ERROR, START, IN_THE_BOX, "map", QUICK, ["clearance 0", "needed 0.2"]),
     (206, "GOAL_OCCUPIED", ERROR, START, IN_UNKNOWN, "map", QUICK, ["clearance 0", "needed 0.2", "unknown"]),
     (207, "TIMEOUT", ERROR, START, ON_THE_WAY_OUT, "map", ENDLESS | {"planning_time": 0.05}, ["planning_time", "0.05"]),
-    (208, "NO_VALID_PATH", ERROR, START, ON_THE_WAY_OUT, "map", QUICK, ["300 of 300"]),
+    (207, "TIMEOUT", ERROR, START, ON_THE_WAY_OUT, "map", QUICK | {"informed": False}, ["300 of 300"]),
     (208, "NO_VALID_PATH", ERROR, START, IN_THE_CHAMBER, "map", QUICK, ["No path"]),
     (212, "INVALID_POSE", ERROR, START, (math.nan, 5.0, 0.0), "map", QUICK, ["finite"]),
     (212, "INVALID_POSE", ERROR, (math.inf, 5.0, 0.0), GOAL, "map", QUICK, ["finite"]),

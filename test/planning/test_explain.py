@@ -41,7 +41,8 @@ def walls_with_a_gap(gap, value=100, resolution=0.5, origin=(-10.0, -10.0, 0.0))
 
 def why(problem, **settings):
     """The plan of a problem without a path, whose sentence reads like one."""
-    result = plan(problem, Settings(**{"samples": 60, "seed": 1, "planning_time": 60.0, **settings}))
+    limit = 0.3 if settings.get("informed", True) else 60.0  # without a path an informed search goes on up to that
+    result = plan(problem, Settings(**{"samples": 60, "seed": 1, "planning_time": limit, **settings}))
     assert result.path is None
     assert result.message.endswith(".")
     assert "\n" not in result.message
@@ -61,7 +62,8 @@ def test_too_narrow_a_gap_in_a_grid_is_measured(resolution, gap, width, radius, 
     problem = Problem(map, Vehicle(0.5, 0.9), start, goal)
     result = why(problem)
     middle = map.to_map_frame(np.array([10.0, (gap.start + gap.stop) / 2 * resolution]))
-    assert result.status == Status.NO_VALID_PATH
+    # Half a cell of 0.5 m is too much to prove it.
+    assert result.status == (Status.TIMEOUT if resolution == 0.5 else Status.NO_VALID_PATH)
     x, y = (round(coordinate, 2) + 0.0 for coordinate in result.location)
     assert (f"the widest way found between start and goal is {width} wide at ({x:.2f}, {y:.2f}); "
             f"with radius {radius} instead of 0.9 m they are connected") in result.message
@@ -93,7 +95,7 @@ def test_a_proof_before_the_search_names_the_narrowest_place():
 def test_a_gap_too_narrow_to_be_proved_is_named_after_the_search():
     """Less than a cell too narrow: the proof leaves it open, but more samples are no help."""
     problem = Problem(walls_with_a_gap(slice(50, 52), resolution=0.2), Vehicle(0.5, 0.23), START, GOAL)
-    result = why(problem)
+    result = why(problem, informed=False)
     assert result.samples == 60
     assert result.message.startswith("No path found: 60 of 60 samples drawn, ")
     assert "0.40 m wide at (0.00, 0.20); with radius 0.19 m instead of 0.23 m" in result.message
@@ -317,12 +319,11 @@ def test_a_start_that_faces_a_wall():
     assert abs(result.location[1] - 10) == pytest.approx(y - 10, abs=0.002)
 
 
-@pytest.mark.parametrize("status", [Status.NO_VALID_PATH, Status.TIMEOUT])
-def test_a_goal_with_its_back_to_a_wall(status):
+@pytest.mark.parametrize("limits", [{"informed": False}, {"samples": 1_000_000, "planning_time": 0.02}])
+def test_a_goal_with_its_back_to_a_wall(limits):
     map, (x, y, _) = facing_a_wall(0.8)
-    limits = {} if status == Status.NO_VALID_PATH else {"samples": 1_000_000, "planning_time": 0.02}
     result = why(Problem(map, Vehicle(1.0, 0.3), (3.0, 3.0, 0.0), (x, y, math.pi)), **limits)
-    assert result.status == status
+    assert result.status == Status.TIMEOUT
     assert ("no forward arc reaches the goal: every one that ends there comes through an obstacle within the last 0.53 m, "
             "the longest at (11.00, ") in result.message
     assert "move or turn the goal" in result.message
@@ -340,14 +341,14 @@ def test_a_free_start_and_goal_are_not_blamed():
     assert "arc" not in plan(problem, Settings(samples=1, seed=1)).message
     # Beyond a gap that the disc fits through, but hardly any curve.
     hard = Problem(walls_with_a_gap(slice(20, 22)), Vehicle(9.0, 0.45), (-5.0, -8.0, math.pi / 2), (5.0, -8.0, -math.pi / 2))
-    result = why(hard)
+    result = why(hard, informed=False)
     near = np.hypot(result.tree.poses[:, 0] - 5, result.tree.poses[:, 1] + 8).min()
     said = float(re.search(r"the tree came within ([\d.]+) m of the goal; allow more samples, or loosen the goal's tolerance\.$",
                            result.message)[1])
     assert near <= said <= near + 0.01
     assert f"60 of 60 samples drawn, {len(result.tree)} tree nodes, " in result.message
     assert result.location is None
-    late = why(hard, samples=1_000_000, planning_time=0.1 if kernels_compiled else 3.0)
+    late = why(hard, samples=1_000_000, planning_time=0.5 if kernels_compiled else 3.0)
     assert "allow more time, or loosen the goal's tolerance" in late.message
 
 

@@ -171,7 +171,7 @@ def test_headings_many_turns_beyond_pi(goal):
 
 
 def test_an_unreachable_goal_ends_the_runs():
-    """Nothing is found behind a wall, by any of the first runs; the last of them ends the search."""
+    """Nothing is found behind a wall, by any of the first runs, nor by one for narrow places, which ends the search."""
     data = np.zeros((20, 20))
     data[:, 13] = 100
     closed = Problem(GridMap(data, 0.25), VEHICLE, (2.5, 2.5, 0.0), (4.5, 2.5, 0.0))

@@ -85,9 +85,16 @@ def test_a_cancellation_waits_for_no_more_than_a_step(planner, informed):
 
 
 def test_the_sample_budget_ends_it(planner):
-    result = plan(hard_to_reach(), settings(planner, samples=200))
-    assert_refused(result, Status.NO_VALID_PATH, "200 of 200 samples", "allow more samples")
+    result = plan(hard_to_reach(), settings(planner, samples=200, informed=False))
+    assert_refused(result, Status.TIMEOUT, "200 of 200 samples", "allow more samples")
     assert result.samples == 200
+
+
+def test_a_search_without_a_path_goes_on_beyond_the_budget(planner):
+    result = plan(hard_to_reach(), settings(planner, samples=200, planning_time=0.5))
+    assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "allow more time")
+    assert result.samples > 200
+    assert f"{result.samples} samples drawn" in result.message
 
 
 def test_cancelled_before_the_first_path(planner):

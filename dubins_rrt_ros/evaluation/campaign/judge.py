@@ -103,11 +103,8 @@ def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         yield from (f"the path: {finding}" for finding in audit_path(answer.path, problem).findings)
         if trial.fits is False:
             yield "it found a path where there is none"
-    elif answer.status == Status.NO_VALID_PATH:
+    elif answer.status in (Status.NO_VALID_PATH, Status.TIMEOUT):
         yield from _check_failure(trial, answer)
-    elif answer.status == Status.TIMEOUT:
-        if answer.planning_time < settings.planning_time:
-            yield f"it gave up after {answer.planning_time:.3g} s, the limit being {settings.planning_time:g} s"
     elif answer.status not in _REFUSALS:
         yield f"{answer.status.name}: {answer.message}"
 
@@ -168,13 +165,16 @@ def _outside(world_map: Map, pose: Pose) -> float:
 def _check_failure(trial: Trial, answer: Plan) -> Iterator[str]:
     """Yield what is wrong with the statement that there is no path, or that none was found."""
     problem, settings = trial.problem, trial.settings
-    if answer.message.startswith("No path exists"):
+    if answer.status == Status.NO_VALID_PATH:
         if trial.fits or _is_connected(problem):
             yield f"a way leads from start to goal, but: {answer.message}"
         return
-    if answer.samples < settings.samples:
-        yield f"it gave up after {answer.samples} of {settings.samples} samples"
-    if trial.fits and (settings.informed or (settings.goal_bias == 1 and settings.step_size == 0)):
+    is_spent = not settings.informed and answer.samples == settings.samples
+    if answer.planning_time < settings.planning_time and not is_spent:
+        yield (f"it gave up after {answer.samples} of {settings.samples} samples and {answer.planning_time:.3g} s, "
+               f"the limit being {settings.planning_time:g} s")
+    has_budget = settings.planning_time == AMPLE_TIME
+    if trial.fits and has_budget and (settings.informed or (settings.goal_bias == 1 and settings.step_size == 0)):
         yield f"the shortest curve leads to the goal, but: {answer.message}"
 
 
@@ -226,7 +226,7 @@ def _check_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator
 
 def _check_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
     """Yield what differs if the same request is made again."""
-    if trial.settings.planning_time < AMPLE_TIME:  # its end depends on the time
+    if trial.settings.planning_time < AMPLE_TIME or answer.status == Status.TIMEOUT:  # its end depends on the time
         return
     again = plan(replace(trial.problem), trial.settings)
     names = "poses", "parents", "costs", "words", "lengths"

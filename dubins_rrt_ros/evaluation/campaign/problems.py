@@ -23,7 +23,8 @@ POSES = 40
 #: Range of samples of most problems, and number for a few.
 SAMPLES, MANY_SAMPLES = (20, 400), 3000
 #: Time limit of most problems, which is never reached, and range of those of some, which is [s].
-AMPLE_TIME, SHORT_TIME = 60.0, (0.001, 0.05)
+#: Time limit of most problems, which only a search without a path reaches, and range of that of some, which end with it [s].
+AMPLE_TIME, SHORT_TIME = 1.0, (0.001, 0.05)
 #: Footprints with a circumscribed radius of about 1: x ahead of the reference point, y to its left.
 OUTLINES = {
     "centred": [[1, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]],

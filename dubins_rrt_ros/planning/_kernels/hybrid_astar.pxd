@@ -25,6 +25,12 @@ cdef class HybridAStar:
     cdef double[::1] costs
     cdef int[::1] parents
     cdef signed char[::1] turns
+    cdef double[::1] arcs
+    cdef double[::1] keys
+    cdef signed char[::1] tried
+    cdef double[::1] arc_factors
+    cdef int next_factor
+    cdef double retry_penalty
     cdef signed char[::1] curve_may_be_free
     cdef ClosedSet closed_set
     cdef ClosedSet visits_near
@@ -36,6 +42,8 @@ cdef class HybridAStar:
     cdef void expand(self, int node) noexcept nogil
     cdef bint reaches_goal(self, int node) noexcept nogil
     cdef void extend(self, int node, double sine, double cosine, int turn) noexcept nogil
+    cdef double next_arc(self) noexcept nogil
     cdef (double, bint) cost_to_go(self, Pose pose, double limit) noexcept nogil
     cdef Curve curve_to_goal(self, Pose pose, int goal, double limit) noexcept nogil
-    cdef void add(self, Pose pose, double cost, int parent, int turn, double key, bint curve_may_be_free) noexcept nogil
+    cdef void add(self, Pose pose, double cost, int parent, int turn, double arc, double key,
+                  bint curve_may_be_free) noexcept nogil

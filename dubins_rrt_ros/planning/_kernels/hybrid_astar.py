@@ -63,7 +63,7 @@ class HybridAStar:
     """
 
     def __init__(self, checker: CollisionChecker, radius, start, goals, to_goal: CostToGoKernel, corner, extent, arc, sectors,
-                 weight, visit_penalty, limit, max_expanded):
+                 weight, visit_penalty, limit, max_expanded, arc_factors=None, retry_penalty=0.0):
         """Start a search.
 
         Args:
@@ -79,6 +79,9 @@ class HybridAStar:
             visit_penalty: added to a pose's key for each pose expanded in its block of four cells [lengths of arcs].
             limit: cost that paths must be below [m].
             max_expanded: maximum number of poses to expand.
+            arc_factors: (n,) random factors of the lengths of arcs, used in turn; None is 1.
+            retry_penalty: added to a pose's key each time it was expanded, to expand it again with other arcs [lengths of arcs];
+                0 expands each pose once.
         """
         self.checker, self.radius = checker, radius
         self.to_goal, self.goals = to_goal, goals
@@ -89,18 +92,21 @@ class HybridAStar:
         self.visits_near = ClosedSet(corner, extent, 1.4 * arc, 1)  # its costs are counts of expanded poses
         self.poses, self.costs = np.empty((0, 3)), np.empty(0)
         self.parents, self.turns, self.curve_may_be_free = np.empty(0, np.int32), np.empty(0, np.int8), np.empty(0, np.int8)
+        self.arcs, self.keys, self.tried = np.empty(0), np.empty(0), np.empty(0, np.int8)
+        self.arc_factors = np.ones(1) if arc_factors is None else arc_factors
+        self.next_factor, self.retry_penalty = 0, retry_penalty
         self.open = Heap(0)
         self.last = -1
         self.size = self.expanded = 0
         self.ended = False
         self.reserve(1)
-        self.add(Pose(start[0], start[1], start[2]), 0, -1, 0, 0, True)
+        self.add(Pose(start[0], start[1], start[2]), 0, -1, 0, 0, 0, True)
 
     def run(self, expansions: cython.int):
         """Expand up to `expansions` more poses, fewer where the search ends."""
         _: cython.int
         expansions = min(expansions, self.max_expanded - self.expanded)
-        self.reserve(TURNS * expansions)
+        self.reserve((TURNS + 1) * expansions)
         with cython.nogil:
             for _ in range(expansions):
                 if self.open.count == 0 or self.last >= 0:
@@ -119,6 +125,8 @@ class HybridAStar:
             self.poses, self.costs = resized(self.poses, capacity), resized(self.costs, capacity)
             self.parents, self.turns = resized(self.parents, capacity), resized(self.turns, capacity)
             self.curve_may_be_free = resized(self.curve_may_be_free, capacity)
+            self.arcs, self.keys = resized(self.arcs, capacity), resized(self.keys, capacity)
+            self.tried = resized(self.tried, capacity)
 
     def path(self):
         """Return the path that was found, or None.
@@ -138,7 +146,8 @@ class HybridAStar:
         poses = np.concatenate([np.asarray(self.poses)[nodes], np.asarray(self.goals)[self.last_goal:self.last_goal + 1]])
         turns = np.asarray(self.turns)[nodes]
         words = np.append(np.where(turns < 0, 1, 0), self.last_curve.word).astype(np.int8)
-        lengths = np.where(np.column_stack([turns != 0, turns == 0, np.zeros(len(nodes), bool)]), self.arc, 0.0)
+        arcs = np.asarray(self.arcs)[nodes][:, None]
+        lengths = np.where(np.column_stack([turns != 0, turns == 0, np.zeros(len(nodes), bool)]), arcs, 0.0)
         lengths[:1] = 0
         last = [self.last_curve.first, self.last_curve.second, self.last_curve.third]
         return poses, words, np.concatenate([lengths, [last]])
@@ -151,13 +160,13 @@ class HybridAStar:
         """Try the curve to the goal, then the three arcs from a pose, unless another pose of its cell was expanded."""
         pose: Pose = self.pose_of(node)
         entry: cython.int = self.closed_set.entry_at(pose.x, pose.y, pose.theta)
-        if self.closed_set.costs[entry] == EXPANDED:
+        if not self.tried[node] and self.closed_set.costs[entry] == EXPANDED:
             return
         self.closed_set.costs[entry] = EXPANDED
         self.expanded += 1
         if self.visit_penalty > 0:
             self.visits_near.costs[self.visits_near.entry_at(pose.x, pose.y, 0)] += 1
-        if self.curve_may_be_free[node] and self.reaches_goal(node):
+        if not self.tried[node] and self.curve_may_be_free[node] and self.reaches_goal(node):
             self.last = node
             return
         sine: cython.double = sin(pose.theta)
@@ -165,6 +174,10 @@ class HybridAStar:
         self.extend(node, sine, cosine, 0)
         self.extend(node, sine, cosine, 1)
         self.extend(node, sine, cosine, -1)
+        if self.retry_penalty > 0:
+            self.tried[node] = 1
+            self.keys[node] += self.retry_penalty * self.arc
+            self.open.push(node, self.keys[node])
 
     def reaches_goal(self, node):
         """Return whether the shortest curve to a goal is free; if so, it is the last one of the path."""
@@ -186,8 +199,9 @@ class HybridAStar:
         Keep the pose at its end, if that is free, the cheapest of its cell so far and may lead to the goal below the limit.
         """
         pose: Pose = self.pose_of(node)
-        curve: Curve = single_arc(turn, self.arc)
-        end: Pose = drive_from(pose, sine, cosine, self.radius, turn, self.arc)
+        arc: cython.double = self.next_arc()
+        curve: Curve = single_arc(turn, arc)
+        end: Pose = drive_from(pose, sine, cosine, self.radius, turn, arc)
         end = Pose(end.x, end.y, remainder(end.theta, TWO_PI))
         if not self.checker.pose_is_free(end):
             return
@@ -207,7 +221,13 @@ class HybridAStar:
         key: cython.double = cost + self.weight * more
         if self.visit_penalty > 0:
             key += self.visit_penalty * self.arc * self.visits_near.costs[self.visits_near.entry_at(end.x, end.y, 0)]
-        self.add(end, cost, node, turn, key, curve_may_be_free)
+        self.add(end, cost, node, turn, arc, key, curve_may_be_free)
+
+    def next_arc(self):
+        """Return the length of the next arc [m]."""
+        arc: cython.double = self.arc * self.arc_factors[self.next_factor]
+        self.next_factor = self.next_factor + 1 if self.next_factor + 1 < self.arc_factors.shape[0] else 0
+        return arc
 
     def cost_to_go(self, pose, limit):
         """Return a lower bound of the cost to the goal, and whether the curve to it may be free; valid below `limit`."""
@@ -223,11 +243,12 @@ class HybridAStar:
                                cos(pose.theta), self.goals[goal, 2], self.goal_headings[goal, 0], self.goal_headings[goal, 1],
                                self.radius, self.rounding, limit)
 
-    def add(self, pose, cost, parent, turn, key, curve_may_be_free):
+    def add(self, pose, cost, parent, turn, arc, key, curve_may_be_free):
         """Add a pose that was reached to the open set."""
         node: cython.int = self.size
         self.size += 1
         self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = pose.x, pose.y, pose.theta
         self.costs[node], self.parents[node], self.turns[node] = cost, parent, turn
         self.curve_may_be_free[node] = curve_may_be_free
+        self.arcs[node], self.keys[node], self.tried[node] = arc, key, 0
         self.open.push(node, key)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,16 @@ from .smoothing import smooth
 #: FIRST_VISIT_PENALTY.
 FIRST_RUNS = ((0.5, 16), (0.3, 24), (0.15, 32))
 FIRST_WEIGHT, FIRST_VISIT_PENALTY = 2.0, 0.5
+#: Runs for narrow places, which follow by turns as long as there is no path: in a tunnel that leaves millimetres turns must begin
+#: just where they have to, so arcs have random lengths, and a pose is expanded again and again. Length of the arcs in turning
+#: radii, range of its random factor, number of headings, and penalties in arcs: of a pose for each time that it was expanded, and
+#: of visits of the same place.
+NARROW_RUNS = ((0.05, (0.2, 20.0), 128, 3.0, 0.5), (0.05, (0.2, 20.0), 128, 3.0, 0.0), (0.05, (0.2, 20.0), 64, 3.0, 2.0),
+               (0.1, (0.1, 10.0), 64, 1.5, 0.5), (0.02, (0.2, 50.0), 320, 3.0, 0.5))
+#: Number of poses that the first of these runs expand, the factor by which it grows each time round, and its maximum.
+NARROW_EXPANSIONS, NARROW_GROWTH, MOST_NARROW_EXPANSIONS = 8192, 3, 262_144
+#: Number of random factors of the arcs of such a run; they are used in turn.
+FACTORS = 8192
 #: Next runs, which come closer and closer to the shortest path: length of arcs, number of headings, weight of the cost-to-go.
 NEXT_RUNS = ((0.4, 16, 1.1), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
 #: Range of the random length of arcs of all later runs, so that their closed sets differ; they weigh the cost-to-go as it is.
@@ -57,6 +68,10 @@ class HybridAStarRuns:
     @cached_property
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng((self._settings.seed, 1))  # apart from that of the samples
+
+    @cached_property
+    def _narrow_rng(self) -> np.random.Generator:
+        return np.random.default_rng((self._settings.seed, 3))
 
     @property
     def between_runs(self) -> bool:
@@ -102,23 +117,39 @@ class HybridAStarRuns:
             for first_round in (True, False):
                 path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round)
         self._count(path is not None and path_cost(path) < best_cost, is_first)
+        # Not even arcs of all lengths lead anywhere from the start.
+        self.exhausted = self.exhausted or (is_first and self._in_vain > len(FIRST_RUNS) and run.size == 1)
         return path
 
     def _count(self, improved: bool, is_first: bool) -> None:
         """Count the runs in a row that were in vain."""
         self._in_vain = 0 if improved else self._in_vain + 1
-        self.exhausted = self._in_vain == (len(FIRST_RUNS) if is_first else MOST_IN_VAIN)
+        self.exhausted = not is_first and self._in_vain == MOST_IN_VAIN
 
     def _next_run(self, best_cost: float) -> HybridAStar:
         is_first = best_cost == math.inf
+        if is_first and self._in_vain >= len(FIRST_RUNS):
+            return self._narrow_run(self._in_vain - len(FIRST_RUNS))
         arc, headings, weight = self._measures(is_first)
+        return self._new_run(arc, headings, weight, FIRST_VISIT_PENALTY if is_first else 0.0,
+                             limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED)
+
+    def _narrow_run(self, number: int) -> HybridAStar:
+        """Return the run of this number for narrow places."""
+        arc, (least, most), headings, retry_penalty, visit_penalty = NARROW_RUNS[number % len(NARROW_RUNS)]
+        factors = np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS))
+        expansions = min(NARROW_EXPANSIONS * NARROW_GROWTH ** (number // len(NARROW_RUNS)), MOST_NARROW_EXPANSIONS)
+        return self._new_run(arc, headings, FIRST_WEIGHT, visit_penalty, limit=UNLIMITED, max_expanded=expansions,
+                             arc_factors=factors, retry_penalty=retry_penalty)
+
+    def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
+        """Return a run with arcs of this length in turning radii, and headings in its closed set."""
         problem, radius = self._problem, self._problem.vehicle.turning_radius
         corners = problem.map.corners()
         return HybridAStar(
             checker=self._checker, radius=radius, start=problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
             corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=headings, weight=weight,
-            visit_penalty=FIRST_VISIT_PENALTY if is_first else 0.0, limit=UNLIMITED if is_first else SLACK * best_cost,
-            max_expanded=MOST_EXPANDED)
+            visit_penalty=visit_penalty, **options)
 
     def _measures(self, is_first: bool) -> tuple[float, int, float]:
         """Return the length of the next run's arcs in turning radii, its number of headings, its weight of the cost-to-go."""

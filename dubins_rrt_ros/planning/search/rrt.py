@@ -58,6 +58,8 @@ EXPANSIONS, MOST_FIRST, MOST_SECOND = (256, 32_768, 4096) if COMPILED else (32, 
 #: Number of poses that hybrid A* expands in the background of a block: for a disc, and for a polygon, which takes several times
 #: as long. The search waits for them at the end of the block.
 BACKGROUND_EXPANSIONS, BACKGROUND_EXPANSIONS_OF_POLYGON = 1024, 128
+#: The factor of these numbers as long as there is no path.
+WITHOUT_PATH = 16
 #: Number of rounds of smoothing for the first path.
 ROUNDS = 3
 
@@ -118,8 +120,9 @@ class Search:
 
     @property
     def done(self) -> bool:
-        """True if the budget is used, or RRT has its path."""
-        return self.samples == self._settings.samples or (self.best >= 0 and self._is_rrt)
+        """True if RRT has its path, or the budget is used: informed, a search without a path goes on beyond it."""
+        used = self.samples >= self._settings.samples and (self.best >= 0 or not self._settings.informed)
+        return used or (self.best >= 0 and self._is_rrt)
 
     @property
     def _is_rrt(self) -> bool:
@@ -140,12 +143,16 @@ class Search:
         while not self.done:
             batch = yield from self._take_block(batch)
 
+    def wait(self) -> None:
+        """Wait until nothing of the search runs in the background."""
+        if self._runs:
+            self._runs.wait()
+
     def make_bound(self) -> CostToGo | None:
         """Make the cost-to-go a lower bound, and return it; None unless the search is informed. It then waits for hybrid A*."""
         if not self._bounds:
             return None
-        if self._runs:
-            self._runs.wait()
+        self.wait()
         return self._bounds.make_to_goal()
 
     def _may_end(self, smoothing_is_due: bool = False) -> bool:
@@ -205,10 +212,13 @@ class Search:
 
     def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
         """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
-        end = min(begin + min(size, self._settings.samples - self.samples), BLOCK)
+        left = self._settings.samples - self.samples
+        end = min(begin + min(size, left if left > 0 else size), BLOCK)
         self._kernel.reserve(end - begin)
         started = time.perf_counter()
-        next_one = (self._kernel.rrt if self._is_rrt else self._kernel.rrt_star)(block, begin, end)
+        # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
+        is_rrt = self._is_rrt or (self._runs is not None and self.best < 0)
+        next_one = (self._kernel.rrt if is_rrt else self._kernel.rrt_star)(block, begin, end)
         took, taken = time.perf_counter() - started, next_one - begin
         self.samples += taken
         self.best = self._kernel.best_goal_node()
@@ -222,7 +232,8 @@ class Search:
         self._insert_if_better(self._runs.collect())
         if not self._runs.exhausted:
             has_footprint = bool(self._problem.vehicle.footprint)
-            self._runs.start(BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS, self.cost)
+            expansions = BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS
+            self._runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost)
 
     def _limit_to_best(self) -> bool:
         """Draw and add only what can be on a cheaper path than the best, and forget other nodes; False where nothing limits."""
