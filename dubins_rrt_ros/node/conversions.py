@@ -185,7 +185,7 @@ def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
 
 
 def status_message(node: str, status: Status, message: str, *, plan_id: int = 0, revision: int = 0,
-                   plan: Plan | None = None, map_id: str = "") -> DiagnosticStatus:
+                   plan: Plan | None = None, map_id: str = "", is_warning: bool = False) -> DiagnosticStatus:
     """Return a planning event as a message, for a person and for a program.
 
     Args:
@@ -195,10 +195,12 @@ def status_message(node: str, status: Status, message: str, *, plan_id: int = 0,
         plan_id, revision: number of the request and of the answer to it; 0 where the event belongs to no request.
         plan: the answer, where a planner ran; figures that do not exist stay empty.
         map_id: id of the map that it is about.
+        is_warning: True if the level is WARN whatever the state.
     """
     values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
     values |= _figures(plan) | {"map_id": map_id}
-    return DiagnosticStatus(level=_level(status, plan, plan_id), name=f"{node}: planner", message=one_line(message),
+    level = DiagnosticStatus.WARN if is_warning else _level(status, plan, plan_id)
+    return DiagnosticStatus(level=level, name=f"{node}: planner", message=one_line(message),
                             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()])
 
 

@@ -93,7 +93,7 @@ class Dispatcher:
         self._queue.post(partial(call, *arguments))
 
     def _end(self, plan_id: int, on_end: OnEnd, result: Plan | Exception) -> None:
-        outcome = outcome_of(result, self._node)
+        outcome = self._maps.with_remark(outcome_of(result, self._node))
         self._under_way.pop(plan_id).outcome.set_result(outcome)
         on_end(plan_id, outcome)
 

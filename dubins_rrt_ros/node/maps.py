@@ -18,6 +18,7 @@ from dubins_rrt_ros.planning.text import one_line
 
 from .conversions import as_grid, grid_from, grid_message
 from .executor_queue import ExecutorQueue
+from .outcome import Outcome
 from .parameters import NodeOptions, Parameters
 from .qos import LATCHED, VOLATILE
 from .worker import Worker
@@ -142,11 +143,18 @@ class Maps:
             self._publisher.publish(self.message(grid))
         self._queue.post(self._on_news)
 
-    def refuse(self, error: MapError) -> None:
-        """Report why a map cannot be used; the one before stays."""
-        self.refusal = f" The last one was refused: {error}."
-        self._node.get_logger().error(f"A map was refused: {error}")
+    def refuse(self, error: MapError, log_again: bool = True) -> None:
+        """Report why a map cannot be used; the one before stays. It is logged, `log_again` or not, where the reason is new."""
+        before, self.refusal = self.refusal, f" The last one was refused: {error}."
+        if log_again or self.refusal != before:
+            self._node.get_logger().error(f"A map was refused: {error}")
         self._queue.post(self._on_news)
+
+    def with_remark(self, outcome: Outcome) -> Outcome:
+        """Return the outcome of a request; where the last map was refused, its message says that it is about an older one."""
+        if not self.refusal or outcome.plan is None:
+            return outcome
+        return outcome._replace(message=f"{outcome.message} This is on an older map.{self.refusal}")
 
     def load(self, name: str, directory: str, on_end: Callable[[Loaded | Exception], None]) -> None:
         """Load a map in the worker's thread.
@@ -170,7 +178,7 @@ class Maps:
         try:
             grid = grid_from(message, self._frame, self._options.max_map_cells, self._options.thresholds)
         except MapError as error:
-            self.refuse(error)
+            self.refuse(error, log_again=False)  # it may come each second
         else:
             self.take(grid, grid, by_topic=True)
 

@@ -13,11 +13,17 @@ from .request import Refusal
 
 
 class Outcome(NamedTuple):
-    """A status, the sentence that explains it and, where a planner ran, its plan."""
+    """A status, the sentence that explains it and, where a planner ran, its plan.
+
+    Attributes:
+        status, message, plan: these.
+        is_warning: True if it is no failure, but a person should look at it.
+    """
 
     status: Status
     message: str
     plan: Plan | None = None
+    is_warning: bool = False
 
 
 def outcome_of(result: Plan | Exception, node: Node) -> Outcome:

@@ -91,10 +91,10 @@ class Outputs:
             plan_id, revision: which answer to which request; 0 where it belongs to none.
             map_id: the newest map's; the plan's own takes precedence.
         """
-        status, message, plan = outcome
+        status, message, plan, is_warning = outcome
         self.status, self.plan_id = status, plan_id
         self._event = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
-                                     map_id=map_id if plan is None else plan.problem.map.id)
+                                     map_id=map_id if plan is None else plan.problem.map.id, is_warning=is_warning)
         self._status.publish(self._event)
         if log:
             self._log(self._event)

@@ -27,6 +27,7 @@ class Readiness:
         self.start: Pose | None = None
         self._start_refusal = ""  # why the last start was refused
         self._reported = ""  # what is missing, as it was logged last
+        self._map_refusal = ""  # why the last map was refused while there was one, as it was reported
 
     # What planning needs
 
@@ -77,14 +78,31 @@ class Readiness:
         self._outputs.report(outcome, log=self._start_refusal != before, map_id=self.map_id)
 
     def update(self) -> bool:
-        """Log what is missing where that has changed; a missing map is reported as status too. Return True if it changed."""
+        """Log what is missing where that has changed; a missing map is reported as status too. Return True if it changed.
+
+        The first time a missing start is reported as status as well, and a refused map whenever there is an older one.
+        """
+        self._report_refused_map()
         before, self._reported = self._reported, self._missing()
         if self._reported == before:
             return False
         self._log()
         if self._maps.map is None:
             self._outputs.report(Outcome(Status.NO_MAP, self._reported), log=False)
+        elif self._outputs.status is None and self._reported:
+            self._outputs.report(Outcome(Status.NO_START, self._reported), log=False, map_id=self.map_id)
         return True
+
+    def _report_refused_map(self) -> None:
+        """Report once, as a warning, that a map was refused and an older one is planned on; and when a newer one is taken."""
+        if self._maps.map is None:
+            return
+        before, self._map_refusal = self._map_refusal, self._maps.refusal
+        if self._map_refusal and self._map_refusal != before:
+            message = f"Planning goes on on an older map.{self._map_refusal}"
+            self._outputs.report(Outcome(Status.NONE, message, is_warning=True), log=False, map_id=self.map_id)
+        elif before and not self._map_refusal:
+            self._outputs.report(Outcome(Status.NONE, "The newest map is planned on."), log=False, map_id=self.map_id)
 
     def remind(self, is_idle: bool) -> None:
         """Log again what is missing, and correct the status where what it misses has come since.

@@ -94,7 +94,9 @@ def test_what_the_planner_refuses_is_a_line(capsys):
     told = {"problem": "walled", "error_name": "GOAL_OCCUPIED", "time_to_first": None, "first_cost": None, "final_cost": None,
             "trace": [], "path": [], "samples": 0, "vertices": 1}
     assert lines[0].items() >= told.items()
-    assert "walled: 0/1 solved, first path - ms, - m\n" in capsys.readouterr().out
+    assert lines[0]["message"].startswith("Goal is occupied: ")
+    assert ("walled: 0/1 solved, first path - ms, - m\n  GOAL_OCCUPIED: Goal is occupied: clearance "
+            in capsys.readouterr().out)
 
 
 def test_a_start_that_is_the_goal_has_a_path_without_length():

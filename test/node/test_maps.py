@@ -205,17 +205,30 @@ def test_a_map_that_changes_during_a_request_is_checked_when_it_ends(replanning)
     wait_for_path_around(client, DETOUR)
 
 
-def test_a_refused_map_changes_nothing(replanning):
+def test_a_refused_map_leaves_the_path_alone_and_is_told_once(replanning):
     process, client = replanning
     show_path(client, process)
     publish(client, process, HARMLESS)
     told, shown = len(client.statuses), len(client.paths)
-    client.publish_map(occupancy(CLOSED, frame="odom"))
-    client.wait_for_word("in frame 'odom', not in 'map'")
+    for _ in range(3):  # as a map that is published at 1 Hz comes
+        client.publish_map(occupancy(CLOSED, frame="odom"))
+        client.wait_for_word("in frame 'odom', not in 'map'")
     client.call(LoadMap, "load_map", map_url="nowhere")  # what follows a refusal comes before the next answer
     client.call(GetMap, "get_map")
-    assert (len(client.statuses), len(client.paths)) == (told, shown)
+    warnings = client.wait_for(lambda: client.statuses[told + 1:] and client.statuses[told:], "the two refusals")
+    assert [(status.level, values_of(status)["plan_id"]) for status in warnings] == [(DiagnosticStatus.WARN, "0")] * 2
+    for status, reason in zip(warnings, ("in frame 'odom', not in 'map'", "nowhere: no such map file"), strict=True):
+        assert status.message.startswith("Planning goes on on an older map. The last one was refused: ")
+        assert reason in status.message
+        assert values_of(status)["map_id"] == id_of(HARMLESS)
+    assert len(client.paths) == shown
     assert process.output.split("in frame 'odom'")[1].count("The map changed") == 0
+
+    path, told = client.plan(START, GOAL)
+    assert path.poses and "This is on an older map. The last one was refused: nowhere" in told["message"]
+    publish(client, process, FREE)
+    client.wait_for(lambda: client.statuses[-1].message == "The newest map is planned on.", "the end of the warning")
+    assert "older map" not in client.plan(START, GOAL)[1]["message"]
 
 
 def test_without_the_parameter_a_new_map_leaves_the_path_alone(plain):

@@ -130,6 +130,18 @@ def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the
     assert client.status_of(2, samples="300")["error_name"] == "NONE"
 
 
+def test_with_a_map_file_the_status_is_that_a_start_is_waited_for(planners, map_file):
+    planners.start(map_file=map_file, **QUICK)
+    client = planners.client()
+    client.listen_to_diagnostics()
+    told = client.status_of(0, error_name="NO_START")
+    assert (told["level"], told["message"][:20]) == (DiagnosticStatus.WARN, "Waiting for a start:")
+    assert "start_pose" in told["message"] and told["map_id"]
+    client.wait_for(lambda: client.diagnostics and client.diagnostics[0].message == told["message"], "a diagnostic that says so")
+    client.send("start_pose", START)
+    assert client.status_of(0, error_name="NONE")["message"] == "Ready for a goal."
+
+
 @pytest.fixture
 def nothing_known(planners):
     """A client of a planner without map and start."""

@@ -263,7 +263,11 @@ class Conversation:
         """The status after a start that cannot be used; the planner knows none then."""
         self.client.statuses.clear()
         self.client.send(topic, pose, frame)
-        return self.client.status_of(0)
+        names = ("INVALID_POSE", "TF_ERROR")  # and not what was said of maps before
+        name = self.client.wait_for(lambda: next((values["error_name"] for values in map(values_of, self.client.statuses)
+                                                  if values["plan_id"] == "0" and values["error_name"] in names), None),
+                                    "the refusal of a start")
+        return self.client.status_of(0, error_name=name)
 
     def goal(self, pose, frame: str = "map", **wanted: str) -> dict[str, str]:
         """The status of a goal, the first that has the wanted values."""

@@ -6,6 +6,8 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from dubins_rrt_ros.planning.text import one_line
+
 from ..common.documents import read_json, read_text
 from ..common.parser import UsageError
 
@@ -20,6 +22,7 @@ class RunRecord(NamedTuple):
         end: time until which the result is known [s]: its limit, or its end if that was later.
         total: duration, at most the time limit [s].
         samples, nodes: number of samples drawn, and of nodes of the tree; 0 where the line does not say.
+        reason: why it is not solved; "" where it is, or the line does not say.
     """
 
     problem: str
@@ -31,6 +34,7 @@ class RunRecord(NamedTuple):
     total: float
     samples: int
     nodes: int
+    reason: str = ""
 
     @property
     def first(self) -> tuple[float, float]:
@@ -85,7 +89,12 @@ def parse_record(line: Mapping[str, Any]) -> RunRecord:
     return RunRecord(
         problem=str(line["problem"]), planner=str(line["planner"]), seed=int(line["seed"]), solved=solved, trace=trace,
         end=max(limit, total), total=min(limit, total), samples=int(line.get("samples") or 0),
-        nodes=int(line.get("vertices") or 0))
+        nodes=int(line.get("vertices") or 0), reason="" if solved else _reason(line))
+
+
+def _reason(line: Mapping[str, Any]) -> str:
+    """Return why a run is not solved, by its name and its sentence, as far as the line has them."""
+    return ": ".join(one_line(str(line[name])) for name in ("error_name", "message") if line.get(name))
 
 
 def _improvements(trace: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

@@ -52,11 +52,20 @@ def ratio(cost: float, best: Best) -> float:
 
 
 def summary(runs: Runs) -> str:
-    """Write a line for each problem: number of solved runs, and medians."""
-    return "\n".join(f"{problem}: {sum(run.solved for run in group)}/{len(group)} solved, "
-                     f"first path {milliseconds(median(run.first[0] for run in group))} ms, "
-                     f"{metres(median(run.cost for run in group))} m"
-                     for problem, planners in runs.items() for group in planners.values())
+    """Write a line for each problem: number of solved runs, and medians; and why a run is not solved, for each error once."""
+    return "\n".join(line for problem, planners in runs.items() for group in planners.values()
+                     for line in (_summary_line(problem, group), *_reasons(group)))
+
+
+def _summary_line(problem: str, group: list[RunRecord]) -> str:
+    return (f"{problem}: {sum(run.solved for run in group)}/{len(group)} solved, "
+            f"first path {milliseconds(median(run.first[0] for run in group))} ms, {metres(median(run.cost for run in group))} m")
+
+
+def _reasons(group: list[RunRecord]) -> list[str]:
+    """Return a line for each error among the runs, with the sentence of the first that has it."""
+    first = {run.reason.partition(":")[0]: run.reason for run in reversed(group) if run.reason}
+    return [f"  {reason}" for reason in reversed(first.values())]
 
 
 def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
