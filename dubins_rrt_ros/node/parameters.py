@@ -47,7 +47,7 @@ class NodeOptions:
 
     @property
     def thresholds(self) -> Thresholds:
-        """What the values of cells mean in grids by topic."""
+        """The thresholds of cells in grids by topic."""
         return Thresholds.of_fractions(self.free_thresh, self.occupied_thresh)
 
 

@@ -7,9 +7,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from dubins_rrt_ros.planning.text import one_line
 
-#: What is of interest now alone: poses.
+#: Quality of service of messages that matter only when they are sent: poses.
 VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
-#: What whoever subscribes later gets too.
+#: Quality of service of messages whose last one late subscribers get too.
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-#: What a job does: it is called with a function that returns True once the job is cancelled; what it returns, or raises, is the
+#: The work of a job: called with a function that returns True once the job is cancelled; its result, or what it raises, is the
 #: outcome.
 Work = Callable[[Callable[[], bool]], Any]
 #: Called with the outcome of a job: its result, or the exception that ended it.

@@ -1,4 +1,4 @@
-"""The vehicle: how tightly it turns and how much room it takes."""
+"""The vehicle: its turning radius, and the space that it covers."""
 
 import json
 import math

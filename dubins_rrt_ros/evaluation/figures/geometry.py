@@ -19,7 +19,7 @@ from dubins_rrt_ros.cli.common.plots import FAILURE, FREE, GOAL, OBSTACLE, PATH,
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle
 from dubins_rrt_ros.planning.collision.footprint import cover
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
-from dubins_rrt_ros.planning.curves.dubins import candidates, shortest
+from dubins_rrt_ros.planning.curves.dubins import SIDES, candidates, shortest
 
 #: Width of a figure [inch], and font sizes.
 WIDTH, TITLE, LABEL = 7.2, 13, 12
@@ -27,7 +27,6 @@ WIDTH, TITLE, LABEL = 7.2, 13, 12
 SPACING = 0.1
 #: Poses so close that all six words have a curve, which LRL and RLR have for close poses only; the radius is 1 m.
 FROM, TO = (0.0, 0.0, math.radians(30)), (3.0, 1.0, math.radians(180))
-TURN = {"L": 1, "S": 0, "R": -1}
 #: A room with obstacles, and a curve of a disc that passes between them [m].
 ROOM = PolygonMap(shapely.difference(shapely.box(0, 0, 12, 6), shapely.union_all([shapely.Polygon(corners) for corners in (
     [(3.4, 6.0), (3.2, 3.5), (4.6, 2.9), (5.6, 4.2), (5.2, 6.0)], [(5.2, 0.0), (5.5, 1.9), (6.9, 2.4), (7.4, 0.0)],
@@ -76,7 +75,7 @@ def _add_legend(figure: Figure, handles: list[Artist]) -> None:
 def _draw_word(axes: Axes, curve: DubinsCurve, colour: str) -> None:
     """Draw a curve, the circles of its turns, and their letters."""
     for turn, begin, length in zip(curve.word, accumulate(curve.lengths, initial=0.0), curve.lengths, strict=False):
-        side = TURN[turn]
+        side = SIDES[turn]
         if side:
             axes.add_patch(Circle(_left_of(curve.pose_at(begin), side * curve.radius), curve.radius, fill=False, color=UNKNOWN,
                                   linewidth=1, linestyle="--"))

@@ -1,1 +1,1 @@
-"""Why there is no path, in sentences with figures."""
+"""The reasons why there is no path, in sentences with figures."""

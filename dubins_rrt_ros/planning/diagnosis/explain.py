@@ -1,4 +1,4 @@
-"""Why there is no path: a sentence for a person, with the measured figures, what to change, and the point that shows it."""
+"""The reason why there is no path: a sentence for a person, with figures and a remedy, and the point that shows it."""
 
 import math
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ POINTS = 33
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why there is no path.
+    """The reason why there is no path.
 
     Attributes:
         status: that of the plan without a path.

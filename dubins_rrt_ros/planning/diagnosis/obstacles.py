@@ -15,7 +15,7 @@ from ..vehicle import Point
 ROUNDING = 1e-9
 #: Coordinates are clamped to this, so that their squares stay finite [m].
 LARGEST_COORDINATE = 1e100
-#: What an obstacle can be.
+#: The kinds of obstacles.
 OBSTACLE, UNKNOWN_SPACE, MAP_EDGE = "obstacle", "unknown space", "the map's edge"
 #: Points of the unit disc, those of a square grid that lie beyond it moved to its rim ...
 DISC = np.array([(x / 8, y / 8) for x in range(-9, 10) for y in range(-9, 10) if x * x + y * y <= 81])

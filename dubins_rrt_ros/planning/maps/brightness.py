@@ -14,7 +14,7 @@ FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205
 
 
 class Rules(NamedTuple):
-    """What brightness means: the fields of a map_server file of these names.
+    """The meaning of brightness: the fields of a map_server file of these names.
 
     By default those of files that keep free, occupied and unknown cells apart.
     """

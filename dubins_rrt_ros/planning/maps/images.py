@@ -17,7 +17,7 @@ from .errors import MapError
 MAX_PLAIN_PGM_BYTES, PLAIN_PGM_BYTES_PER_PIXEL = 64 * 2**20, 16
 #: The longest PGM header, with its comments, that is read [bytes].
 MAX_PGM_HEADER_BYTES = 64 * 2**10
-#: What the chunks of a PNG may take beyond twice the bytes of its pixels [bytes].
+#: Size that the chunks of a PNG may have beyond twice the bytes of its pixels [bytes].
 PNG_SLACK = 2**20
 
 #: Largest difference between red, green and blue of a shade of grey.

@@ -19,7 +19,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
 
 class Thresholds(NamedTuple):
-    """What the values of cells mean, on the scale of nav_msgs/OccupancyGrid; by default what map_server's 0.25 and 0.65 do.
+    """The meaning of the values of cells, on the scale of nav_msgs/OccupancyGrid; by default what map_server's 0.25 and 0.65 do.
 
     Attributes:
         free_up_to: maximum value of a free cell [%].

@@ -14,7 +14,7 @@ MAX_MAP_CELLS = 100_000_000
 
 
 class ReadOptions(NamedTuple):
-    """What a reader of map files is told.
+    """The options of all readers of map files.
 
     Attributes:
         max_map_cells: maximum number of cells of a grid.

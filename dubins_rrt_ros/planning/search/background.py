@@ -16,10 +16,10 @@ def cores() -> int:
 
 
 class BackgroundExecutor:
-    """Runs jobs on the cores beside the caller's; who waits for a job that has not started runs it himself.
+    """Runs jobs on the other cores; a caller that waits for a job not yet started runs it itself.
 
-    So no job waits for another, and any number of requests can share one executor. With a single core every job is run by who
-    asks for its result. A job must not change what its caller works on; kernels release the interpreter's lock.
+    So no job waits for another, and any number of requests can share one executor. On a single core every job is run by the
+    caller that asks for its result. A job must not change what its caller works on; kernels release the interpreter's lock.
     """
 
     def __init__(self) -> None:

@@ -11,9 +11,8 @@ from .cost_to_go import CostToGo
 def lower_bound(problem: Problem, to_goal: CostToGo | None = None) -> float:
     """Return a length that no path of the problem falls below [m]; infinite where `to_goal` tells that there is none.
 
-    It is that of the Dubins curve without obstacles; or, where the goal has a tolerance, the straight line to where that
-    begins and the turn to the first heading that will do. With `to_goal`, when that is a bound, it is no less than the way
-    around the obstacles.
+    It is the length of the Dubins curve without obstacles; where the goal has a tolerance, the straight line and the turn to the
+    nearest pose within it. With `to_goal`, which must be a bound then, it is at least the way around the obstacles.
     """
     start, goal, radius = problem.start, problem.goal, problem.vehicle.turning_radius
     around = float(to_goal.at(np.array([start[:2]]))[0]) if to_goal else 0.0

@@ -1,4 +1,4 @@
-"""Smoothing: a path is made shorter by shortcuts and by moved waypoints, over curves that are as free."""
+"""Smoothing: shortcuts and moved waypoints make a path shorter, and keep it free."""
 
 import math
 from functools import cached_property
