@@ -104,6 +104,17 @@ class Parameters:
         given = getattr(self._node, "_parameter_overrides", {})
         return [_unknown(name) for name in given if not (self._node.has_parameter(name) or name.startswith("qos_overrides."))]
 
+    def pending(self, changes: Iterable) -> list:
+        """Return what remains to be set of changes, given as rclpy's Parameters.
+
+        Read-only parameters that keep their value are left out, as a dump of all parameters holds them too; an integer becomes
+        a float where one is due, so that the parameter stays a double.
+        """
+        return [_as_declared(change) for change in changes if not self._is_kept(change)]
+
+    def _is_kept(self, change: Any) -> bool:
+        return change.name in READ_ONLY and change.value == self._node.get_parameter(change.name).value
+
     def check(self, changes: Iterable) -> SetParametersResult:
         """Say whether changes, given as rclpy's Parameters, can be made together; the reason of a refusal names the remedy.
 
@@ -160,7 +171,19 @@ def _declare(node: Any, item: Option) -> None:
     # The full descriptor comes after our own check: a refusal by its range names no remedy.
     parameter = node.declare_parameter(item.name, item.default, ParameterDescriptor(dynamic_typing=True))
     item.convert(parameter.value)
+    node.set_parameters([_as_declared(parameter)])
     node.set_descriptor(item.name, descriptor(item))
+
+
+def _as_declared(parameter: Any) -> Any:
+    """Return a Parameter of rclpy, an integer as a float where its option is one."""
+    item = OPTIONS.get(parameter.name)
+    if item is None or (item.type, type(parameter.value)) != (float, int):
+        return parameter
+    try:
+        return type(parameter)(parameter.name, value=float(parameter.value))
+    except OverflowError:
+        return parameter  # which is refused then
 
 
 def _check_alone(name: str, value: Any) -> None:

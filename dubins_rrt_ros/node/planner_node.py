@@ -73,8 +73,9 @@ class PlannerNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; a refusal says what to do, which that of rclpy, which would look first, does not."""
-        verdict = self._parameters_in_use.check(parameter_list)
-        return super().set_parameters_atomically(parameter_list) if verdict.successful else verdict
+        pending = self._parameters_in_use.pending(parameter_list)
+        verdict = self._parameters_in_use.check(pending)
+        return super().set_parameters_atomically(pending) if verdict.successful and pending else verdict
 
     def close(self) -> None:
         """End the workers; nothing is published afterwards."""

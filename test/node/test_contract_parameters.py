@@ -7,8 +7,9 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import DescribeParameters, GetParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import parameter_value_to_python
 from rosgraph_msgs.msg import Clock
 from support.harness import poses_of
@@ -87,6 +88,31 @@ def test_a_parameter_has_its_type_default_description_and_range(defaults, name):
         assert default is None or allowed.from_value <= default <= allowed.to_value
     for choice in CHOICES.get(name, ()):
         assert re.search(rf"\b{choice}\b", described.additional_constraints)
+
+
+def test_a_double_that_is_set_as_an_integer_stays_a_double(defaults):
+    assert defaults.set_parameters(turning_radius=2).successful
+    value, = defaults.call(GetParameters, "get_parameters", names=["turning_radius"]).values
+    assert (value.type, value.double_value) == (DOUBLE, 2.0)
+    assert defaults.set_parameters(turning_radius=1.0).successful
+
+
+def test_a_double_that_is_an_integer_at_start_up_is_a_double(planners):
+    planners.start("-p", "turning_radius:=2")
+    value, = planners.client().call(GetParameters, "get_parameters", names=["turning_radius"]).values
+    assert (value.type, value.double_value) == (DOUBLE, 2.0)
+
+
+def test_a_dump_of_all_parameters_can_be_loaded_again(on_the_yard):
+    """As `ros2 param load` does it: one by one, the read-only ones too; only rclpy's own one is refused, by rclpy."""
+    names = on_the_yard.call(ListParameters, "list_parameters").result.names
+    values = on_the_yard.call(GetParameters, "get_parameters", names=names).values
+    messages = [ParameterMessage(name=name, value=value) for name, value in zip(names, values, strict=True)]
+    results = on_the_yard.call(SetParameters, "set_parameters", parameters=messages).results
+    refused = [name for name, result in zip(names, results, strict=True) if not result.successful]
+    assert set(PARAMETERS) <= set(names) and refused == ["start_type_description_service"]
+    changed = on_the_yard.set_parameters(map_file="other.yaml")
+    assert not changed.successful and "read-only while the node runs" in changed.reason
 
 
 @pytest.mark.parametrize("name", [name for name, (_, default, _) in PARAMETERS.items() if default is not None])
