@@ -99,8 +99,8 @@ def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
 
 
 def poses_of(plan: Plan | None) -> np.ndarray:
-    """Return the (n, 3) poses of a plan's path at the spacing of its settings, (0, 3) without a path."""
-    return plan.path.poses(plan.settings.path_spacing) if plan is not None and plan.path is not None else np.empty((0, 3))
+    """Return the (n, 3) poses of a plan's path, (0, 3) without a plan or a path."""
+    return np.empty((0, 3)) if plan is None else plan.poses()
 
 
 def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
@@ -184,21 +184,24 @@ def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
                                  6 * max(width, height) / RASTER_CELLS))
 
 
-def status_message(node: str, status: Status, message: str, *, plan_id: int = 0, revision: int = 0,
-                   plan: Plan | None = None, map_id: str = "", is_warning: bool = False) -> DiagnosticStatus:
+def status_message(node: str, status: Status, message: str, *, request: str = "", plan_id: int = 0, revision: int = 0,
+                   plan: Plan | None = None, map_id: str = "", stamp: Time | None = None,
+                   is_warning: bool = False) -> DiagnosticStatus:
     """Return a planning event as a message, for a person and for a program.
 
     Args:
         node: the fully qualified name of the node.
         status: the state of the request.
         message: one sentence on it.
+        request: how the request came: goal, get_plan; "" where the event belongs to none.
         plan_id, revision: number of the request and of the answer to it; 0 where the event belongs to no request.
         plan: the answer, where a planner ran; figures that do not exist stay empty.
         map_id: id of the map that it is about.
+        stamp: in the header of the path that was published or answered with it, if there was one.
         is_warning: True if the level is WARN whatever the state.
     """
-    values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name}
-    values |= _figures(plan) | {"map_id": map_id}
+    values = {"plan_id": plan_id, "revision": revision, "error_code": int(status), "error_name": status.name, "request": request}
+    values |= _figures(plan) | {"map_id": map_id, "stamp": None if stamp is None else f"{stamp.sec}.{stamp.nanosec:09}"}
     level = DiagnosticStatus.WARN if is_warning else _level(status, plan, plan_id)
     return DiagnosticStatus(level=level, name=f"{node}: planner", message=one_line(message),
                             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()])

@@ -14,7 +14,7 @@ from .executor_queue import ExecutorQueue
 from .maps import Maps
 from .outcome import Outcome, outcome_of
 from .parameters import Parameters
-from .request import PlanRequest
+from .request import PlanRequest, RefusedRequest
 from .worker import Job, Worker
 
 #: Called in the executor's thread with the id of a request and its outcome.
@@ -74,8 +74,8 @@ class Dispatcher:
         problem = Problem(world_map, now.vehicle, start, goal, **{**now.problem, **options})
         return PlanRequest(plan_id, problem, now.settings, self._maps.world_for_request(), now.node.check_invariants)
 
-    def submit(self, worker: Worker, request: PlanRequest, on_end: OnEnd,
-               on_improvement: OnImprovement | None = None) -> Submission:
+    def submit(self, worker: Worker, request: PlanRequest | RefusedRequest, on_end: OnEnd,
+               on_improvement: OnImprovement | None = None, finish: Callable[[Plan], None] | None = None) -> Submission:
         """Have a worker serve a request after what it was given before.
 
         Args:
@@ -83,9 +83,10 @@ class Dispatcher:
             request: what to plan.
             on_end: called once.
             on_improvement: called for the better paths meanwhile.
+            finish: called in the worker's thread with the plan, before `on_end`: for what would keep the executor waiting.
         """
         improved = None if on_improvement is None else partial(self._post, on_improvement, request.id)
-        job = worker.submit(partial(request.serve, improved), partial(self._post, self._end, request.id, on_end))
+        job = worker.submit(partial(_serve, request, improved, finish), partial(self._post, self._end, request.id, on_end))
         self._under_way[request.id] = submission = Submission(job, Future())
         return submission
 
@@ -107,3 +108,11 @@ class Dispatcher:
         """Cancel all requests and end the workers."""
         for worker in (self.goals, self.services):
             worker.close(SHUTDOWN_TIMEOUT)
+
+
+def _serve(request: PlanRequest | RefusedRequest, improved: Callable[[Plan], None] | None,
+           finish: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
+    plan = request.serve(improved, cancelled)
+    if finish is not None:
+        finish(plan)
+    return plan

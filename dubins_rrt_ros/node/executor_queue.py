@@ -16,7 +16,7 @@ class ExecutorQueue:
         self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._posting = threading.Lock()
         self._closed = False
-        self._posted = node.create_guard_condition(self._make_calls)
+        self._posted = node.create_guard_condition(self._make_call)
 
     def post(self, call: Callable[[], None]) -> None:
         """Have this called in the executor's thread; once the queue is closed, it is not called."""
@@ -30,14 +30,16 @@ class ExecutorQueue:
         with self._posting:
             self._closed = True
 
-    def _make_calls(self) -> None:
-        while not self._calls.empty():
-            call = self._calls.get()
-            try:
-                call()
-            finally:
-                if not self._calls.empty():
-                    self._posted.trigger()  # the calls behind a defect are made too
+    def _make_call(self) -> None:
+        # One at a time: of several coroutines that may go on, rclpy resumes the one that began last first.
+        if self._calls.empty():
+            return
+        call = self._calls.get()
+        try:
+            call()
+        finally:
+            if not self._calls.empty():
+                self._posted.trigger()
 
 
 def steady_timer(node: Node, interval: float, callback: Callable[[], None]) -> Timer:

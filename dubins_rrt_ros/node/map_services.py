@@ -11,6 +11,7 @@ from dubins_rrt_ros.planning import MapError, MapMetadataError, MapNotFound
 
 from .maps import Maps
 from .parameters import Parameters
+from .qos import SERVICE
 from .readiness import Readiness
 
 #: LoadMap's result codes for the errors of a map, the first that fits.
@@ -33,8 +34,8 @@ class MapServices:
                  report_defect: Callable[[Exception], None], group: CallbackGroup):
         self._node, self._parameters, self._maps, self._readiness = node, parameters, maps, readiness
         self._report_defect = report_defect
-        node.create_service(LoadMap, "~/load_map", self._on_load_map, callback_group=group)
-        node.create_service(GetMap, "~/get_map", self._on_get_map)
+        node.create_service(LoadMap, "~/load_map", self._on_load_map, qos_profile=SERVICE, callback_group=group)
+        node.create_service(GetMap, "~/get_map", self._on_get_map, qos_profile=SERVICE)
 
     async def _on_load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
         loaded = Future()

@@ -33,7 +33,7 @@ FINAL_TREE = 10_000
 
 
 class Outputs:
-    """The node's publishers, but for the map's, and its log of events. Only the executor's thread may use them.
+    """The node's publishers, but for the map's, and its log of events. Only the executor's thread may use them, but for `path`.
 
     Attributes:
         shown: the plan whose path and tree are on display, if there is one.
@@ -68,8 +68,8 @@ class Outputs:
             plan_id, revision, map_id: as in `report`.
         """
         is_new = outcome.plan is None or self.shown is None or outcome.plan.problem is not self.shown.problem
-        self._show_path(outcome.plan)
-        self.report(outcome, log=last, plan_id=plan_id, revision=revision, map_id=map_id)
+        stamp = self._show_path(outcome.plan)
+        self.report(outcome, log=last, request="goal", plan_id=plan_id, revision=revision, map_id=map_id, stamp=stamp)
         if last or is_new or time.monotonic() >= self._tree_due:
             self._show_tree(FINAL_TREE if last else GROWING_TREE)
 
@@ -79,29 +79,31 @@ class Outputs:
         self._show_tree(FINAL_TREE)
 
     def path(self, plan: Plan | None) -> PathMessage:
-        """Return the path of a plan as a message, empty where there is none."""
+        """Return the path of a plan as a message, empty where there is none; any thread may ask for it."""
         return path_message(poses_of(plan), self._frame, self._now())
 
-    def report(self, outcome: Outcome, *, log: bool = True, plan_id: int = 0, revision: int = 0, map_id: str = "") -> None:
+    def report(self, outcome: Outcome, *, log: bool = True, request: str = "", plan_id: int = 0, revision: int = 0,
+               map_id: str = "", stamp: Time | None = None) -> None:
         """Publish an event as status.
 
         Args:
             outcome: what happened.
             log: True if it goes to the log too.
-            plan_id, revision: which answer to which request; 0 where it belongs to none.
+            request, plan_id, revision, stamp: as in `status_message`.
             map_id: the newest map's; the plan's own takes precedence.
         """
         status, message, plan, is_warning = outcome
         self.status, self.plan_id = status, plan_id
-        self._event = status_message(self._name, status, message, plan=plan, plan_id=plan_id, revision=revision,
-                                     map_id=map_id if plan is None else plan.problem.map.id, is_warning=is_warning)
+        self._event = status_message(self._name, status, message, plan=plan, request=request, plan_id=plan_id, revision=revision,
+                                     map_id=map_id if plan is None else plan.problem.map.id, stamp=stamp, is_warning=is_warning)
         self._status.publish(self._event)
         if log:
             self._log(self._event)
 
-    def _show_path(self, plan: Plan | None) -> None:
-        self.shown = plan
-        self._path.publish(serialized_path(poses_of(plan), self._frame, self._now()))
+    def _show_path(self, plan: Plan | None) -> Time:
+        self.shown, stamp = plan, self._now()
+        self._path.publish(serialized_path(poses_of(plan), self._frame, stamp))
+        return stamp
 
     def _log(self, event: DiagnosticStatus) -> None:
         # Three calls: rclpy binds a severity to the line that logs.

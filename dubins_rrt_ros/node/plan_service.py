@@ -1,17 +1,20 @@
 """The service get_plan: a plan between the two poses of each request, beside the goals."""
 
+from functools import partial
+
 from nav_msgs.srv import GetPlan
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
-from dubins_rrt_ros.planning import OptionError, Status
+from dubins_rrt_ros.planning import OptionError, Plan, Status
 
 from .dispatcher import Dispatcher
 from .frames import Frames
-from .outcome import Outcome, outcome_of
+from .outcome import Outcome
 from .outputs import Outputs
+from .qos import SERVICE
 from .readiness import Readiness
-from .request import PlanRequest, Refusal
+from .request import PlanRequest, Refusal, RefusedRequest
 
 
 class PlanService:
@@ -19,20 +22,21 @@ class PlanService:
 
     def __init__(self, node: Node, dispatcher: Dispatcher, readiness: Readiness, frames: Frames, outputs: Outputs,
                  group: CallbackGroup):
-        self._node, self._dispatcher, self._readiness = node, dispatcher, readiness
-        self._frames, self._outputs = frames, outputs
-        node.create_service(GetPlan, "~/get_plan", self._on_request, callback_group=group)
+        self._dispatcher, self._readiness, self._frames, self._outputs = dispatcher, readiness, frames, outputs
+        node.create_service(GetPlan, "~/get_plan", self._on_request, qos_profile=SERVICE, callback_group=group)
 
     async def _on_request(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
         plan_id = self._dispatcher.new_id()
+        response.plan = self._outputs.path(None)
         try:
-            submission = self._dispatcher.submit(self._dispatcher.services, self._plan_request(plan_id, request), self._end)
+            planned: PlanRequest | RefusedRequest = self._plan_request(plan_id, request)
         except Exception as error:
-            outcome = outcome_of(error, self._node)
-            self._end(plan_id, outcome)
-        else:
-            outcome = await submission.outcome
-        response.plan = self._outputs.path(outcome.plan)
+            planned = RefusedRequest(plan_id, error)
+
+        def fill(plan: Plan) -> None:
+            response.plan = self._outputs.path(plan)
+
+        await self._dispatcher.submit(self._dispatcher.services, planned, partial(self._end, response), finish=fill).outcome
         return response
 
     def _plan_request(self, plan_id: int, request: GetPlan.Request) -> PlanRequest:
@@ -44,5 +48,6 @@ class PlanService:
         except OptionError as error:
             raise Refusal(Status.INVALID_POSE, f"The tolerance of the request cannot be used: {error}") from None
 
-    def _end(self, plan_id: int, outcome: Outcome) -> None:
-        self._outputs.report(outcome, plan_id=plan_id, revision=1, map_id=self._readiness.map_id)
+    def _end(self, response: GetPlan.Response, plan_id: int, outcome: Outcome) -> None:
+        self._outputs.report(outcome, request="get_plan", plan_id=plan_id, revision=1, map_id=self._readiness.map_id,
+                             stamp=response.plan.header.stamp)

@@ -22,7 +22,7 @@ from .outputs import Outputs
 from .parameters import Parameters
 from .path_check import PathCheck
 from .plan_service import PlanService
-from .qos import VOLATILE
+from .qos import SERVICE, VOLATILE
 from .readiness import Readiness
 
 #: Time between two log lines on what is missing [s].
@@ -68,7 +68,7 @@ class PlannerNode(Node):
         group = ReentrantCallbackGroup()
         self._plan_service = PlanService(self, self._dispatcher, self._readiness, self._frames, self._outputs, group)
         self._map_services = MapServices(self, self._parameters_in_use, self._maps, self._readiness, self.report_defect, group)
-        self.create_service(Trigger, "~/cancel", self._on_cancel, callback_group=group)
+        self.create_service(Trigger, "~/cancel", self._on_cancel, qos_profile=SERVICE, callback_group=group)
         steady_timer(self, REMINDER_INTERVAL, self._on_reminder)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:

@@ -11,6 +11,8 @@ from dubins_rrt_ros.planning.text import one_line
 VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 #: Quality of service of messages whose last one late subscribers get too.
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: Services: a call beyond the depth would be lost without a word, and ten at once, the depth of ROS' own profile, are soon there.
+SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
 
 def incompatible_publishers(publishers: Iterable[TopicEndpointInfo], kind: str) -> list[str]:

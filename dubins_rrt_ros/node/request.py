@@ -23,6 +23,23 @@ class Refusal(Exception):
 
 
 @dataclass(frozen=True, eq=False)
+class RefusedRequest:
+    """A request that cannot be planned; it has its turn nevertheless, so that answers come in order.
+
+    Attributes:
+        id: the plan_id of its answer.
+        error: why.
+    """
+
+    id: int
+    error: Exception
+
+    def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
+        """Raise the error."""
+        raise self.error
+
+
+@dataclass(frozen=True, eq=False)
 class PlanRequest:
     """A request to plan.
 

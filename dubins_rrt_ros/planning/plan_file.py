@@ -38,7 +38,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "gap": _number(plan.gap), "min_clearance": _number(plan.min_clearance),
         "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
-        "poses": path.poses(settings.path_spacing).tolist() if path else [],
+        "poses": plan.poses().tolist(),
         "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
         "vehicle": values(problem.vehicle), "settings": values(problem) | values(settings), "version": __version__,
     }

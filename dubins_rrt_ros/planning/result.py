@@ -5,16 +5,22 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
+import numpy as np
+
 from .audit.verdict import Audit
 from .curves.angles import heading_error, position_error
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
+from .maps.model import GridMap
 from .problem import Pose, Problem
 from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
+
+#: Minimum distance between two poses of a path where the settings leave it to map and vehicle [m].
+MIN_FINE_SPACING = 0.01
 
 
 class Status(IntEnum):
@@ -86,6 +92,17 @@ class Plan:
     def length(self) -> float | None:
         """The length of the path [m], or None."""
         return self.path.length if self.path is not None else None
+
+    def poses(self) -> np.ndarray:
+        """Return the path as (n, 3) poses at most `path_spacing` apart, with every joint between two arcs; (0, 3) without one."""
+        return np.empty((0, 3)) if self.path is None else self.path.poses(self.path_spacing)
+
+    @property
+    def path_spacing(self) -> float:
+        """The maximum distance between two of the poses [m]: that of the settings, or a fine one where that is 0."""
+        world_map, vehicle = self.problem.map, self.problem.vehicle
+        detail = world_map.resolution if isinstance(world_map, GridMap) else vehicle.inscribed_radius / 4
+        return self.settings.path_spacing or max(MIN_FINE_SPACING, min(detail, vehicle.turning_radius / 10))
 
     @property
     def min_clearance(self) -> float | None:

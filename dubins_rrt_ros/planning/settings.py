@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 
-from .option import convert_options, documented, option
+from .option import OptionError, convert_options, documented, option
 
 #: Maximum planning_time [s].
 MAX_PLANNING_TIME = 3600.0
+#: Minimum path_spacing, where it is not 0 [m].
+MIN_SPACING = 0.001
 
 
 @documented
@@ -29,9 +31,12 @@ class Settings:
         "there around obstacles; mixed, a fifth uniform, the others near field", choices=("uniform", "goal", "field", "mixed"))
     informed: bool = option(True, "find a first path by hybrid A*, then have rrt_star sample only where it can become shorter")
     shortcut: bool = option(True, "shorten each best path by Dubins shortcuts and vertex perturbation, and grow the tree from it")
-    path_spacing: float = option(0.05, "maximum distance between two poses of a published path", unit="m",
-                                 low=0.001, high=1000.0)
+    path_spacing: float = option(0.0, "maximum distance between two poses of a published path; 0 is the smaller of a cell (of a "
+                                 "polygon map a quarter of the inscribed radius) and a tenth of the turning radius, and at least "
+                                 "0.01", unit="m", low=0.0, high=1000.0)
     seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
 
     def __post_init__(self) -> None:
         convert_options(self)
+        if 0 < self.path_spacing < MIN_SPACING:
+            raise OptionError(f"path_spacing is {self.path_spacing:g}; give 0 or at least {MIN_SPACING:g} [m]")

@@ -216,7 +216,7 @@ REFUSED = [
         "planner": ("dijkstra", "", "RRT"), "samples": (0, -1, 10_000_001, 2**63 - 1), "planning_time": (0.0, -1.0, 3601.0, NAN),
         "turning_radius": (0.0, -1.0, 1e5, NAN, -INF), "robot_radius": (-0.1, 1e4, NAN), "goal_bias": (-0.1, 1.1, NAN),
         "step_size": (-1.0, 1e7), "heading_sampling": ("north",), "goal_tolerance_xy": (-1.0, INF),
-        "goal_tolerance_yaw": (-0.1, 4.0), "path_spacing": (0.0, 1e4), "seed": (-2, 2**31),
+        "goal_tolerance_yaw": (-0.1, 4.0), "path_spacing": (-0.1, 0.0005, 1e4), "seed": (-2, 2**31),
         "max_map_cells": (0, -5)}.items() for value in bad],
     ("samples", 300.0), ("samples", "300"), ("samples", True), ("samples", [300]), ("samples", None), ("planner", 1),
     ("planner", ["rrt"]), ("planner", None), ("turning_radius", "1.0"), ("turning_radius", True), ("turning_radius", [1.0]),

@@ -39,7 +39,7 @@ PARAMETERS = {
     "goal_tolerance_xy": (DOUBLE, None, -0.1),
     "goal_tolerance_yaw": (DOUBLE, None, 4.0),
     "any_goal_heading": (BOOL, None, "no"),
-    "path_spacing": (DOUBLE, None, 0.0),
+    "path_spacing": (DOUBLE, 0.0, 0.0005),
     "seed": (INTEGER, -1, -2),
     "occupied_thresh": (DOUBLE, 0.65, 1.5),
     "free_thresh": (DOUBLE, 0.25, -0.1),

@@ -9,10 +9,10 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Pose
-from nav_msgs.srv import GetMap, LoadMap
+from nav_msgs.srv import GetMap, GetPlan, LoadMap
 from rcl_interfaces.srv import GetParameters
 from std_srvs.srv import Trigger
-from support.harness import poses_of, values_of
+from support.harness import poses_of, stamped, values_of
 from support.yard import BEHIND, ENDLESS, GOAL, IN_THE_BOX, ON_THE_WAY_OUT, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, save_map
@@ -46,7 +46,7 @@ def test_get_plan_gives_a_path_from_start_to_goal_in_the_frame_and_does_not_publ
     assert {pose.header.frame_id for pose in path.poses} == {path.header.frame_id} == {"map"}
     assert path.header.stamp.sec > 0
     steps = np.linalg.norm(np.diff(found[:, :2], axis=0), axis=1)
-    assert steps.max() <= 0.05 + 1e-9
+    assert steps.max() <= 0.1 + 1e-9
     assert steps.sum() == pytest.approx(float(told["path_length"]), rel=1e-3)
     assert (told["level"], told["error_name"], told["revision"], told["audit"]) == (DiagnosticStatus.OK, "NONE", "1", "ok")
     client.wait_for_word(told["message"])
@@ -159,6 +159,40 @@ def test_several_requests_at_once_are_all_answered_in_their_order(planner):
     client.status_of(first + len(goals) - 1)
     ids = [int(values_of(status)["plan_id"]) for status in client.statuses]
     assert [number for number in ids if number >= first] == list(range(first, first + len(goals)))
+
+
+def test_two_hundred_calls_at_once_of_twenty_five_clients_get_their_answers_in_order(planner):
+    _, client = planner
+    first = client.next_id
+    callers = [client.node.create_client(GetPlan, "planner/get_plan") for _ in range(25)]
+    client.wait_for(lambda: all(caller.service_is_ready() for caller in callers), "the service for all of them")
+    request, refused = (GetPlan.Request(start=stamped(START), goal=stamped(goal)) for goal in (START, IN_THE_BOX))
+    answered = [[] for _ in callers]
+    for number, (caller, order) in enumerate(zip(callers * 8, answered * 8, strict=True)):
+        future = caller.call_async(refused if number // 25 % 3 == 1 else request)
+        future.add_done_callback(lambda done, number=number, order=order: order.append((number, len(done.result().plan.poses))))
+    client.wait_for(lambda: all(len(order) == 8 for order in answered), "200 answers")
+    for which, order in enumerate(answered):
+        assert order == [(which + 25 * turn, 0 if turn % 3 == 1 else 1) for turn in range(8)]
+    client.status_of(first + 199)
+
+
+def test_a_refused_request_is_answered_in_its_turn(planner):
+    _, client = planner
+    first = client.next_id
+    planned, unusable = client.request_plan(START, GOAL), client.request_plan(START, (math.nan, 0.0, 0.0))
+    client.response(unusable)
+    assert planned.done()
+    assert client.status_of(first)["error_name"] == "NONE"
+    assert client.status_of(first + 1)["error_name"] == "INVALID_POSE"
+
+
+@pytest.mark.parametrize("goal", [GOAL, IN_THE_BOX])
+def test_the_reason_of_an_answer_is_found_by_its_stamp(planner, goal):
+    _, client = planner
+    path, told = client.plan(START, goal)
+    assert told["request"] == "get_plan"
+    assert told["stamp"] == f"{path.header.stamp.sec}.{path.header.stamp.nanosec:09}"
 
 
 def test_a_goal_and_a_request_at_the_same_time_are_both_answered_and_neither_ends_the_other(planner):

@@ -118,7 +118,7 @@ def test_on_a_map_that_changed_paths_are_the_same_as_on_one_that_is_new(plain):
         expected = plan(Problem(GridMap(cells, 0.1), Vehicle(), START, GOAL), Settings(**QUICK))
         assert (told["error_name"], told["map_id"]) == (expected.status.name, id_of(cells))
         if expected.path:
-            wanted = expected.path.poses(expected.settings.path_spacing)
+            wanted = expected.poses()
             assert poses_of(path)[:, :2] == pytest.approx(wanted[:, :2], abs=1e-9)
 
 

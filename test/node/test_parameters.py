@@ -118,7 +118,7 @@ def test_every_parameter_says_what_it_is_and_takes(declared, name):
     ("turning_radius", -1.0), ("turning_radius", 0), ("turning_radius", "1.0"), ("turning_radius", math.nan),
     ("turning_radius", math.inf), ("samples", 0), ("samples", 3000.0), ("planner", "dijkstra"), ("planner", 3),
     ("allow_unknown", "yes"), ("allow_unknown", 1), ("seed", -2), ("goal_bias", 1.5), ("goal_bias", 2),
-    ("path_spacing", 0.0), ("robot_radius", [0.2]), ("planning_time", None),
+    ("path_spacing", 0.0005), ("robot_radius", [0.2]), ("planning_time", None),
 ])
 def test_a_bad_value_is_refused_at_run_time_with_the_reason_and_nothing_changes(declared, name, value):
     node = declared()

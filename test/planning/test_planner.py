@@ -261,3 +261,23 @@ def test_a_plan_is_shown_in_one_line():
     solved, failed = (plan(Problem(empty_map(), VEHICLE, START, goal), settings("rrt")) for goal in (GOAL, (99.0, 0.0, 0.0)))
     assert repr(solved) == f"Plan(NONE: {solved.message})"
     assert repr(failed).startswith("Plan(GOAL_OUTSIDE_MAP: Goal (99, 0) is ") and not failed.solved
+
+
+@pytest.mark.parametrize(("resolution", "radius", "spacing", "expected"), [
+    (0.05, 1.0, 0.0, 0.05), (1.0, 2.0, 0.0, 0.2), (0.05, 0.05, 0.0, 0.01), (0.05, 1.0, 0.3, 0.3)])
+def test_the_poses_of_a_plan_are_a_cell_apart_or_a_tenth_of_the_turning_radius_unless_a_spacing_is_given(
+        resolution, radius, spacing, expected):
+    grid = GridMap(np.zeros((200, 200), np.int8), resolution)
+    found = plan(Problem(grid, Vehicle(turning_radius=radius, robot_radius=0.0), (1.0, 1.0, 0.0), (4.0, 2.0, 0.3)),
+                 Settings(samples=10, seed=1, planning_time=60.0, path_spacing=spacing))
+    assert found.path_spacing == pytest.approx(expected)
+    steps = np.linalg.norm(np.diff(found.poses()[:, :2], axis=0), axis=1)
+    assert 0.5 * expected < steps.max() <= expected + 1e-9
+
+
+@pytest.mark.parametrize(("robot_radius", "expected"), [(0.2, 0.05), (0.01, 0.01), (2.0, 0.1)])
+def test_on_polygons_the_poses_are_a_quarter_of_the_inscribed_radius_apart(robot_radius, expected):
+    free = PolygonMap.of([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)], [])
+    found = plan(Problem(free, Vehicle(robot_radius=robot_radius), (4.0, 4.0, 0.0), (9.0, 6.0, 0.3)),
+                 Settings(samples=10, seed=1, planning_time=60.0))
+    assert found.path_spacing == pytest.approx(expected)

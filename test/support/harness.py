@@ -148,10 +148,10 @@ class Client:
         """Publish (x, y, yaw) or a geometry_msgs/Pose on a pose topic."""
         from geometry_msgs.msg import PoseWithCovarianceStamped
 
-        message = _stamped(pose, frame)
+        message = stamped(pose, frame)
         if topic == "initialpose":
-            stamped, message = message, PoseWithCovarianceStamped(header=message.header)
-            message.pose.pose = stamped.pose
+            plain, message = message, PoseWithCovarianceStamped(header=message.header)
+            message.pose.pose = plain.pose
         self._publishers[topic].publish(message)
 
     def listen_to_map(self) -> None:
@@ -195,7 +195,7 @@ class Client:
         """Ask get_plan for a path between two (x, y, yaw), geometry_msgs/Pose or PoseStamped; a future with its response."""
         from nav_msgs.srv import GetPlan
 
-        return self.request(GetPlan, "get_plan", start=_stamped(start, frame), goal=_stamped(goal, frame),
+        return self.request(GetPlan, "get_plan", start=stamped(start, frame), goal=stamped(goal, frame),
                             tolerance=tolerance)
 
     def plan(self, start, goal, **more):
@@ -367,7 +367,8 @@ def occupancy(cells: np.ndarray, frame: str = "map"):
     return grid_message(GridMap(cells, 0.1), frame, Time())
 
 
-def _stamped(pose, frame: str):
+def stamped(pose, frame: str = "map"):
+    """A PoseStamped of an (x, y, yaw) or a geometry_msgs/Pose; one that is stamped already stays."""
     from geometry_msgs.msg import Pose, PoseStamped
 
     from dubins_rrt_ros.node.conversions import pose_message

@@ -73,6 +73,6 @@ def write_document(file: str, document: dict[str, Any]) -> None:
 
 def write_csv(file: str, plan: Plan) -> None:
     """Write the poses of the path at the spacing of the settings: a header x,y,theta and a row each."""
-    poses = plan.path.poses(plan.settings.path_spacing).tolist() if plan.path else []
+    poses = plan.poses().tolist()
     with Path(file).open("w", newline="", encoding="utf-8") as out:
         csv.writer(out, lineterminator="\n").writerows([["x", "y", "theta"], *poses])

@@ -58,10 +58,9 @@ class Drawing(NamedTuple):
 def draw_plan(file: str, plan: Plan) -> None:
     """Draw a plan to a file, whose ending selects the format."""
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
-    path = plan.path.poses(plan.settings.path_spacing) if plan.path else np.empty((0, 3))
     title, subtitle = _captions(plan)
     draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
-                       plan.tree.segments(size / 400), path, title, subtitle, plan.location))
+                       plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location))
 
 
 def _captions(plan: Plan) -> tuple[str, str]:
