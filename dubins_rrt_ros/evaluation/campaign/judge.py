@@ -140,7 +140,7 @@ def _check_ends(problem: Problem, answer: Plan) -> Iterator[str]:
 
 
 def _check_refusal(status: Status, room: float, outside: float) -> Iterator[str]:
-    """Yield what is wrong with the refusal of a pose that has `room` to spare and is `outside` the map by so much [m]."""
+    """Yield what is wrong with the refusal of a pose that has `room` to spare and lies `outside` the map by that distance [m]."""
     if room > MARGIN:
         yield f"{status.name}, but the vehicle has {room:.6f} m to spare there"
     if status in _OUTSIDE and outside == 0:

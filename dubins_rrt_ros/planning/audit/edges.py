@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def audit_curves(curves: Sequence["DubinsCurve"], ends: Sequence[Pose], problem: Problem) -> tuple[str, ...]:
-    """Judge curves that the problem's vehicle shall be able to drive, each from its start to its end.
+    """Judge curves that the problem's vehicle is to drive, each from its start to its end.
 
     Returns:
         What is wrong, one sentence each, which names the curve by its index.
