@@ -145,6 +145,16 @@ class Vehicle:
             return self.robot_radius
         return float(shapely.distance(shapely.LinearRing(self.footprint), shapely.Point(0, 0)))
 
+    @property
+    def maneuver_scale(self) -> float:
+        """The length that manoeuvres are measured in [m].
+
+        It is the turning radius, but twice the inscribed radius for a vehicle that nearly turns on the spot: on a smaller scale
+        than its own no obstacle looks different to it.
+        """
+        inscribed = self.inscribed_radius
+        return self.turning_radius if self.turning_radius >= inscribed else 2 * inscribed
+
     def _derive(self, name: str, value: float) -> None:
         derived = next(item for item in options(Vehicle) if item.name == name)
         object.__setattr__(self, name, derived.convert(value))

@@ -241,3 +241,17 @@ def test_the_tree_holds_the_smoothed_path(step, problems):
     if step:
         assert path.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
         assert len(path.words) > 25
+
+
+@needs_compiled
+@pytest.mark.parametrize("turning_radius", [0.1, 0.001])
+def test_a_smaller_turning_radius_hardly_makes_a_path_longer(turning_radius):
+    """Whatever the one vehicle drives the other can; it used to be a third longer, or not found at all."""
+    rng = np.random.default_rng(1)
+    cells = np.where(np.kron(rng.random((50, 50)) < 0.1, np.ones((8, 8), bool)), 100, 0).astype(np.int8)
+    cells[:16, :16] = cells[-16:, -16:] = 0
+    lengths = {}
+    for radius in (1.0, turning_radius):
+        vehicle = Vehicle(radius, 0.2)
+        lengths[radius] = plan(Problem(GridMap(cells, 0.1), vehicle, (0.8, 0.8, 0.8), (39.2, 39.2, 0.8)), Settings(seed=1)).length
+    assert lengths[turning_radius] <= 1.02 * lengths[1.0]

@@ -14,6 +14,7 @@ cdef class HybridAStar:
     cdef double[:, ::1] goal_headings
     cdef double rounding
     cdef double arc
+    cdef double turning_arc
     cdef double weight
     cdef double visit_penalty
     cdef double limit
@@ -42,7 +43,7 @@ cdef class HybridAStar:
     cdef void expand(self, int node) noexcept nogil
     cdef bint reaches_goal(self, int node) noexcept nogil
     cdef void extend(self, int node, double sine, double cosine, int turn) noexcept nogil
-    cdef double next_arc(self) noexcept nogil
+    cdef double next_arc(self, int turn) noexcept nogil
     cdef (double, bint) cost_to_go(self, Pose pose, double limit) noexcept nogil
     cdef Curve curve_to_goal(self, Pose pose, int goal, double limit) noexcept nogil
     cdef void add(self, Pose pose, double cost, int parent, int turn, double arc, double key,

@@ -63,7 +63,7 @@ class HybridAStar:
     """
 
     def __init__(self, checker: CollisionChecker, radius, start, goals, to_goal: CostToGoKernel, corner, extent, arc, sectors,
-                 weight, visit_penalty, limit, max_expanded, arc_factors=None, retry_penalty=0.0):
+                 weight, visit_penalty, limit, max_expanded, turning_arc=None, arc_factors=None, retry_penalty=0.0):
         """Start a search.
 
         Args:
@@ -79,6 +79,7 @@ class HybridAStar:
             visit_penalty: added to a pose's key for each pose expanded in its block of four cells [lengths of arcs].
             limit: cost that paths must be below [m].
             max_expanded: maximum number of poses to expand.
+            turning_arc: length of an arc that turns [m]; None is `arc`.
             arc_factors: (n,) random factors of the lengths of arcs, used in turn; None is 1.
             retry_penalty: added to a pose's key each time it was expanded, to expand it again with other arcs [lengths of arcs];
                 0 expands each pose once.
@@ -95,6 +96,7 @@ class HybridAStar:
         self.arcs, self.keys, self.tried = np.empty(0), np.empty(0), np.empty(0, np.int8)
         self.arc_factors = np.ones(1) if arc_factors is None else arc_factors
         self.next_factor, self.retry_penalty = 0, retry_penalty
+        self.turning_arc = arc if turning_arc is None else turning_arc
         self.open = Heap(0)
         self.last = -1
         self.size = self.expanded = 0
@@ -199,7 +201,7 @@ class HybridAStar:
         Keep the pose at its end, if that is free, the cheapest of its cell so far and may lead to the goal below the limit.
         """
         pose: Pose = self.pose_of(node)
-        arc: cython.double = self.next_arc()
+        arc: cython.double = self.next_arc(turn)
         curve: Curve = single_arc(turn, arc)
         end: Pose = drive_from(pose, sine, cosine, self.radius, turn, arc)
         end = Pose(end.x, end.y, remainder(end.theta, TWO_PI))
@@ -223,9 +225,9 @@ class HybridAStar:
             key += self.visit_penalty * self.arc * self.visits_near.costs[self.visits_near.entry_at(end.x, end.y, 0)]
         self.add(end, cost, node, turn, arc, key, curve_may_be_free)
 
-    def next_arc(self):
+    def next_arc(self, turn):
         """Return the length of the next arc [m]."""
-        arc: cython.double = self.arc * self.arc_factors[self.next_factor]
+        arc: cython.double = (self.arc if turn == 0 else self.turning_arc) * self.arc_factors[self.next_factor]
         self.next_factor = self.next_factor + 1 if self.next_factor + 1 < self.arc_factors.shape[0] else 0
         return arc
 

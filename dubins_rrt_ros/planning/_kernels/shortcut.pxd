@@ -6,6 +6,7 @@ from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 cdef class Shortcutter:
     cdef CollisionChecker checker
     cdef double radius
+    cdef double scale
     cdef readonly int count
     cdef readonly double[:, ::1] poses
     cdef readonly signed char[::1] words

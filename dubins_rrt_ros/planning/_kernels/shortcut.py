@@ -57,16 +57,17 @@ class Shortcutter:
         ends: (n,): the arc length of the path up to each pose [m].
     """
 
-    def __init__(self, checker: CollisionChecker, radius: cython.double, poses, words, lengths, tries):
+    def __init__(self, checker: CollisionChecker, radius: cython.double, scale: cython.double, poses, words, lengths, tries):
         """Copy a path.
 
         Args:
             checker: judges every new curve; the path is free by it.
             radius: the turning radius [m].
+            scale: length that the sizes of changes are measured in [m]: the turning radius, or more where that is tiny.
             poses, words, lengths: of the path, as in the attributes.
             tries: number of changes that will be tried, for which room is made.
         """
-        self.checker, self.radius = checker, radius
+        self.checker, self.radius, self.scale = checker, radius, scale
         self.count = len(poses)
         # A change adds two poses at most; between two clearings they are all kept.
         room = self.count + 2 * tries + MAX_NEW
@@ -95,7 +96,7 @@ class Shortcutter:
     def try_change(self, direct, where, back, ahead, across, turn):
         """Try a shortcut or a perturbation; the draws say where, how far back and ahead, and by how much off the path."""
         total: cython.double = self.ends[self.count - 1]
-        least: cython.double = LEAST_SPAN * self.radius
+        least: cython.double = LEAST_SPAN * self.scale
         largest_span: cython.double = log(max(total / least, 2.0))
         pose: cython.int
         if not direct and self.count > 2 and where < VERTEX_SHARE:
@@ -122,7 +123,7 @@ class Shortcutter:
         """Replace the path between two arc lengths by two curves over a pose near the one in the middle, if shorter and free."""
         size: cython.double = exp(-FINENESS * fine)
         via: Pose = self.pose_at(middle)
-        across *= size * min(end - begin, 2 * self.radius)
+        across *= size * min(end - begin, 2 * self.scale)
         via = Pose(via.x - across * sin(via.theta), via.y + across * cos(via.theta), remainder(via.theta + turn * size, TWO_PI))
         limit: cython.double = end - begin - LEAST_GAIN
         if not self.checker.pose_is_free(via):

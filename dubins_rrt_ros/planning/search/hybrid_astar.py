@@ -145,11 +145,13 @@ class HybridAStarRuns:
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
         """Return a run with arcs of this length in turning radii, and headings in its closed set."""
         problem, radius = self._problem, self._problem.vehicle.turning_radius
+        scale = problem.vehicle.maneuver_scale
+        turning_arc = min(arc * scale, max(arc, math.tau / headings) * radius)
         corners = problem.map.corners()
         return HybridAStar(
             checker=self._checker, radius=radius, start=problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
-            corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=headings, weight=weight,
-            visit_penalty=visit_penalty, **options)
+            corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * scale, turning_arc=turning_arc,
+            sectors=headings, weight=weight, visit_penalty=visit_penalty, **options)
 
     def _measures(self, is_first: bool) -> tuple[float, int, float]:
         """Return the length of the next run's arcs in turning radii, its number of headings, its weight of the cost-to-go."""

@@ -91,7 +91,7 @@ class Sampler:
         """Draw (count, 3) poses near a path."""
         poses = best.at(self._rng.random(count))
         size = np.exp(-NEAR_FINENESS * self._rng.random(count))
-        poses[:, :2] += (NEAR_DISTANCE * best.radius * size)[:, None] * self._rng.normal(size=(count, 2))
+        poses[:, :2] += (NEAR_DISTANCE * self._problem.vehicle.maneuver_scale * size)[:, None] * self._rng.normal(size=(count, 2))
         poses[:, 2] = wrap(poses[:, 2] + NEAR_ANGLE * size * self._rng.normal(size=count))
         return poses
 

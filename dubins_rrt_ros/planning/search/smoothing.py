@@ -26,8 +26,9 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
         first_round: True if it was not smoothed before, and may have large loops.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius, poses=path.waypoints,
-                              words=path.words, lengths=path.lengths, tries=TRIES)
+    shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius,
+                              scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
+                              tries=TRIES)
     shortcutter.improve(draws, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
     waypoints, words, lengths = (np.array(view[:shortcutter.count])
                                  for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
