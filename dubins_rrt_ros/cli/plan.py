@@ -11,9 +11,10 @@ from types import FrameType
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan
+from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.example import ENDS, EXAMPLE, MAP
-from .common.flags import add_option_flags, given_options
+from .common.flags import add_option_flags, add_paper_flag, flag, given_options, given_settings
 from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
@@ -56,6 +57,7 @@ def add_arguments(parser: Parser) -> None:
                              "its seed and as many samples as it drew, and no time limit, so that the path is the same")
     for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
         add_option_flags(parser, title, cls)
+    add_paper_flag(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -81,8 +83,10 @@ def _request(arguments: argparse.Namespace) -> LoadedRequest:
 
 
 def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
-    vehicle = Vehicle(**given_options(arguments, Vehicle))
-    settings = Settings(**given_options(arguments, Settings))
+    given = given_options(arguments, Vehicle)
+    for name, by in overridden(given).items():
+        print(f"dubins_rrt plan: warning: {flag(name)} has no effect, as {flag(by)} takes its place", file=sys.stderr)
+    vehicle, settings = Vehicle(**given), Settings(**given_settings(arguments))
     world_map, load_time = read_map(arguments.map, **map_options(arguments))
     problem = Problem(world_map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
     return LoadedRequest(arguments.map, problem, settings, load_time)
@@ -130,10 +134,17 @@ def _report(answer: Plan, request: LoadedRequest, out: TextIO) -> None:
     if answer.path is None:
         print(f"{int(answer.status)} {answer.status.name}: {answer.message}", file=sys.stderr)
         return
-    print(answer.message, _more_figures(answer), file=out)
+    print(*filter(None, [answer.message, _more_figures(answer), _derived_figures(answer.problem.vehicle)]), file=out)
     if request.path is not None and request.path != answer.path:
         print(f"dubins_rrt plan: the path is not the one of {request.source}, which another version may have planned",
               file=sys.stderr)
+
+
+def _derived_figures(vehicle: Vehicle) -> str:
+    """Return the turning radius, where it was not given itself."""
+    if not vehicle.wheelbase:
+        return ""
+    return f"Turning radius {vehicle.turning_radius:.4g} m, by wheelbase and steering angle."
 
 
 def _more_figures(answer: Plan) -> str:

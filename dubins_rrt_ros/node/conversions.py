@@ -208,12 +208,12 @@ def status_message(node: str, status: Status, message: str, *, request: str = ""
 
 
 def _figures(plan: Plan | None) -> dict[str, object]:
-    names = ("planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "time_to_first", "planning_time",
-             "min_clearance", "max_curvature", "audit", "seed")
+    names = ("found_by", "planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "time_to_first",
+             "planning_time", "min_clearance", "max_curvature", "audit", "seed")
     if plan is None:
         return dict.fromkeys(names)
     return dict(zip(names, (
-        plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.lower_bound, plan.gap,
+        plan.found_by, plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.lower_bound, plan.gap,
         plan.time_to_first, plan.planning_time, plan.min_clearance, plan.max_curvature, plan.audit, plan.settings.seed,
     ), strict=True))
 

@@ -11,6 +11,7 @@ from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, 
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 from dubins_rrt_ros.planning.text import quoted_name
+from dubins_rrt_ros.planning.vehicle import overridden
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,12 @@ class Parameters:
         # rclpy has no public access to the values that were given; where this attribute is missing, only the warnings are lost.
         given = getattr(self._node, "_parameter_overrides", {})
         return [_unknown(name) for name in given if not (self._node.has_parameter(name) or name.startswith("qos_overrides."))]
+
+    def overridden(self) -> list[str]:
+        """Return a warning, of one sentence, for each value given at start-up in whose place another one is used."""
+        given = getattr(self._node, "_parameter_overrides", {})
+        set_ones = [name for name, parameter in given.items() if parameter.value]
+        return [f"{name} has no effect, as {by} takes its place" for name, by in overridden(set_ones).items()]
 
     def pending(self, changes: Iterable) -> list:
         """Return what remains to be set of changes, given as rclpy's Parameters.

@@ -54,11 +54,17 @@ class PlannerNode(Node):
         self._listen()
 
     def _warn(self) -> None:
-        for warning in self._parameters_in_use.unknown():
+        for warning in (*self._parameters_in_use.unknown(), *self._parameters_in_use.overridden()):
             self.get_logger().warning(warning)
+        self._log_derived_radius()
         if not kernels_compiled:
             self.get_logger().warning("The planner's kernels are not compiled, it will be slow: install a C compiler "
                                       "and Cython, and build the package again")
+
+    def _log_derived_radius(self) -> None:
+        vehicle = self._parameters_in_use.read().vehicle
+        if vehicle.wheelbase:
+            self.get_logger().info(f"Turning radius {vehicle.turning_radius:.4g} m, by wheelbase and max_steering_angle")
 
     def _listen(self) -> None:
         self.create_subscription(PoseStamped, "start_pose", self._on_start, VOLATILE)
@@ -75,7 +81,12 @@ class PlannerNode(Node):
         """Set parameters; a refusal says what to do, which that of rclpy, which would look first, does not."""
         pending = self._parameters_in_use.pending(parameter_list)
         verdict = self._parameters_in_use.check(pending)
-        return super().set_parameters_atomically(pending) if verdict.successful and pending else verdict
+        if not verdict.successful or not pending:
+            return verdict
+        result = super().set_parameters_atomically(pending)
+        if any(change.name in ("wheelbase", "max_steering_angle") for change in pending):
+            self._log_derived_radius()
+        return result
 
     def close(self) -> None:
         """End the workers; nothing is published afterwards."""

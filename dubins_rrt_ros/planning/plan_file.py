@@ -32,6 +32,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
     problem, settings, path = plan.problem, plan.settings, plan.path
     return {
         "error_code": int(plan.status), "error_name": plan.status.name, "message": plan.message,
+        "found_by": plan.found_by,
         "planner": settings.planner, "seed": settings.seed, "samples": int(plan.samples), "tree_nodes": len(plan.tree),
         "time_to_first": _number(plan.time_to_first), "planning_time": _number(plan.planning_time),
         "map_time": _number(plan.map_time), "length": _number(plan.length), "lower_bound": _number(plan.lower_bound),

@@ -32,6 +32,8 @@ REPORT_INTERVAL = 0.05
 SAME = 1e-9
 #: A path shorter by less than this is no improvement [m].
 LEAST_IMPROVEMENT = 1e-6
+#: What may find a path, by the values of `Plan.found_by`.
+ALGORITHMS = {"hybrid_astar": "hybrid A*", "rrt": "RRT", "rrt_star": "RRT*"}
 #: A block of memory that is larger than any array of most requests [bytes].
 LARGE_BLOCK = 1 << 24
 
@@ -152,7 +154,7 @@ class _Call:
         """Return the plan of a search that goes on."""
         path = search.path
         if path is not None:
-            return self._with_path(path, search.tree, search.samples, running=True)
+            return self._with_path(path, search.tree, search.samples, search.found_by, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
         return self._plan(Status.TIMEOUT, message, search.tree, samples=search.samples)
 
@@ -161,7 +163,7 @@ class _Call:
         path = search.path
         if path is not None:
             self._bound = lower_bound(self._problem, search.make_bound())
-            return self._with_path(path, search.tree, search.samples, cancelled=cancelled and not search.done)
+            return self._with_path(path, search.tree, search.samples, search.found_by, cancelled=cancelled and not search.done)
         return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
@@ -188,7 +190,8 @@ class _Call:
         of_budget = f" of {self._settings.samples}" if samples <= self._settings.samples else ""
         return f"{samples}{of_budget} samples drawn, {tree}, {self._elapsed:.3g} s"
 
-    def _with_path(self, path: Path, tree: Tree, samples: int, *, cancelled: bool = False, running: bool = False) -> Plan:
+    def _with_path(self, path: Path, tree: Tree, samples: int, found_by: str = "", *, cancelled: bool = False,
+                   running: bool = False) -> Plan:
         """Return the plan with a path, if the path passes the audit."""
         audit = self._audit(path)
         if not audit.ok:
@@ -196,9 +199,9 @@ class _Call:
             return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audit)
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
         bound, elapsed = min(self._bound, path.length), self._elapsed
-        message = self._success_message(path, bound, samples, elapsed, cancelled, running)
+        message = self._success_message(path, found_by, bound, samples, elapsed, cancelled, running)
         return self._plan(Status.NONE, message, tree, path=path, samples=samples, cancelled=cancelled, audit=audit,
-                          lower_bound=bound, planning_time=elapsed)
+                          found_by=found_by, lower_bound=bound, planning_time=elapsed)
 
     def _audit(self, path: Path) -> Audit:
         """Audit a path once: an improvement that was reported is often the answer too."""
@@ -206,14 +209,16 @@ class _Call:
             self._last_audit = path, audit_path(path, self._problem, self._obstacles)
         return self._last_audit[1]
 
-    def _success_message(self, path: Path, bound: float, samples: int, elapsed: float, cancelled: bool, running: bool) -> str:
+    def _success_message(self, path: Path, found_by: str, bound: float, samples: int, elapsed: float, cancelled: bool,
+                         running: bool) -> str:
         """Return what was found, in a sentence."""
         so_far = " so far" if running else ""
         gap = gap_above(bound, path.length)
         above = f", at most {100 * gap:.1f} % above the shortest possible" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
         drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample"
-        message = f"Path of {path.length:.2f} m{so_far}{above}, {drawn} in {elapsed:.3g} s"
+        found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
+        message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
         if self._problem.exact_goal:
             return message + "."
         off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)

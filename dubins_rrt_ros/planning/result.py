@@ -62,6 +62,8 @@ class Plan:
         planning_time: time from request to answer, the preparation of the map not counted [s].
         map_time: time for the preparation of the map, and for loading it where the caller added that [s].
         lower_bound: no path of the problem is shorter [m].
+        found_by: what found the path, before it was smoothed: hybrid_astar, rrt or rrt_star; "" without one, and where start and
+            goal are the same.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
     """
 
@@ -78,6 +80,7 @@ class Plan:
     planning_time: float = 0.0
     map_time: float = 0.0
     lower_bound: float = 0.0
+    found_by: str = ""
     audit: Audit | None = None
 
     def __repr__(self) -> str:

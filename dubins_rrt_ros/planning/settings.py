@@ -1,6 +1,7 @@
 """The settings of the planner: one frozen dataclass whose fields are options."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from .option import OptionError, convert_options, documented, option
 
@@ -8,6 +9,8 @@ from .option import OptionError, convert_options, documented, option
 MAX_PLANNING_TIME = 3600.0
 #: Minimum path_spacing, where it is not 0 [m].
 MIN_SPACING = 0.001
+#: The options of the paper's plain algorithms.
+PAPER = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 
 
 @documented
@@ -40,3 +43,12 @@ class Settings:
         convert_options(self)
         if 0 < self.path_spacing < MIN_SPACING:
             raise OptionError(f"path_spacing is {self.path_spacing:g}; give 0 or at least {MIN_SPACING:g} [m]")
+
+    @classmethod
+    def paper(cls, **others: Any) -> "Settings":
+        """Make the settings of the paper's plain RRT and RRT*: without hybrid A*, shortcuts and guided headings.
+
+        Args:
+            others: options by name, which take precedence.
+        """
+        return cls(**{**PAPER, **others})

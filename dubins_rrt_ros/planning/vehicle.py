@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -20,6 +20,11 @@ Footprint = tuple[Point, ...]
 
 #: Maximum number of corners of a footprint.
 MAX_CORNERS = 100
+
+
+def overridden(given: Collection[str]) -> dict[str, str]:
+    """Return which of the options that were given have no effect, each with the given one that takes its place."""
+    return {name: by for name, by in (("robot_radius", "footprint"), ("turning_radius", "wheelbase")) if {name, by} <= set(given)}
 
 
 def _read_footprint(value: Any) -> Footprint:

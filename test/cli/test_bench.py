@@ -95,6 +95,7 @@ def test_what_the_planner_refuses_is_a_line(capsys):
             "trace": [], "path": [], "samples": 0, "vertices": 1}
     assert lines[0].items() >= told.items()
     assert lines[0]["message"].startswith("Goal is occupied: ")
+    assert [line["found_by"] for line in lines] == ["", "hybrid_astar"]
     assert ("walled: 0/1 solved, first path - ms, - m\n  GOAL_OCCUPIED: Goal is occupied: clearance "
             in capsys.readouterr().out)
 

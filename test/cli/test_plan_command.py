@@ -14,7 +14,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.planning import PolygonMap, rasterise, save_map
+from dubins_rrt_ros.planning import PolygonMap, Settings, rasterise, save_map
 
 HALL = shapely.box(-6, -5, 6, 5).difference(shapely.box(-1, -5, 0, 1))
 REQUEST = ["--start", "-4", "-3", "1.5707963267948966", "--goal", "3.5", "-3", "-1.5707963267948966"]
@@ -50,6 +50,31 @@ def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
     assert status == 0 and error == "" and out.count("\n") == 1
     for figure in (" m, ", "%", "150 samples", "Lower bound ", "first path after ", "tree nodes", "seed 4"):
         assert figure in out
+
+
+def test_how_a_path_was_found_is_told(hall, capsys):
+    for flags, found_by, name in ((["--planner", "rrt"], "hybrid_astar", "hybrid A*"),
+                                  (["--planner", "rrt", "--paper"], "rrt", "RRT"), (["--paper"], "rrt_star", "RRT*")):
+        budget = ("--samples", "5000", "--planning-time", "60", "--seed", "4", "--json", "-")
+        status, out, error = run(hall, *REQUEST, *flags, *budget, capsys=capsys)
+        assert status == 0
+        document = json.loads(out)
+        assert document["found_by"] == found_by
+        assert f", found by {name}, " in document["message"] and document["message"] in error
+    settings = json.loads(out)["settings"]
+    assert (settings["informed"], settings["shortcut"], settings["heading_sampling"]) == (False, False, "uniform")
+    assert Settings.paper(samples=7, informed=True) == Settings(samples=7, shortcut=False, heading_sampling="uniform")
+
+
+def test_a_flag_that_another_one_overrides_is_told_and_the_turning_radius_that_results(hall, capsys):
+    car = ("--footprint", "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]", "--wheelbase", "0.3",
+           "--max-steering-angle", "0.5")
+    status, out, error = run(hall, *REQUEST, *BUDGET, *car, capsys=capsys)
+    assert (status, error) == (0, "") and "Turning radius 0.5491 m, by wheelbase and steering angle." in out
+    status, out, error = run(hall, *REQUEST, *BUDGET, *car, "--robot-radius", "0.3", "--turning-radius", "1", capsys=capsys)
+    assert status == 0 and error.splitlines() == [
+        "dubins_rrt plan: warning: --robot-radius has no effect, as --footprint takes its place",
+        "dubins_rrt plan: warning: --turning-radius has no effect, as --wheelbase takes its place"]
 
 
 def test_unknown_space_that_counts_as_free_is_warned_about(hall, capsys):

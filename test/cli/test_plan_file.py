@@ -16,7 +16,7 @@ from dubins_rrt_ros.planning.text import LONGEST
 
 FIGURES = ("time_to_first", "planning_time", "map_time", "length", "lower_bound", "gap", "min_clearance",
            "max_curvature")
-FIELDS = {"error_code", "error_name", "message", "planner", "seed", "samples", "tree_nodes", *FIGURES, "audit",
+FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES, "audit",
           "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}
 
 

@@ -103,6 +103,16 @@ def test_a_double_that_is_an_integer_at_start_up_is_a_double(planners):
     assert (value.type, value.double_value) == (DOUBLE, 2.0)
 
 
+def test_the_turning_radius_that_results_is_logged_with_what_has_no_effect(planners):
+    process = planners.start(wheelbase=0.3, max_steering_angle=0.5, turning_radius=2.0)
+    client = planners.client()
+    client.wait_for_word("Turning radius 0.5491 m, by wheelbase and max_steering_angle")
+    client.wait_for_word("turning_radius has no effect, as wheelbase takes its place")
+    assert client.set_parameters(wheelbase=0.6, max_steering_angle=0.5).successful
+    client.wait_for_word("Turning radius 1.098 m")
+    assert "robot_radius has no effect" not in process.output
+
+
 def test_a_dump_of_all_parameters_can_be_loaded_again(on_the_yard):
     """As `ros2 param load` does it: one by one, the read-only ones too; only rclpy's own one is refused, by rclpy."""
     names = on_the_yard.call(ListParameters, "list_parameters").result.names

@@ -268,7 +268,8 @@ def test_a_long_and_thin_polygon_map_is_published_with_no_more_cells(size):
     assert as_grid(PolygonMap(shapely.box(0, 0, *size))).data.size <= 2 * RASTER_CELLS
 
 
-KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "planner", "samples", "tree_nodes", "path_length",
+KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
+        "path_length",
         "lower_bound", "gap", "time_to_first", "planning_time", "min_clearance", "max_curvature", "audit",
         "seed", "map_id", "stamp"]
 

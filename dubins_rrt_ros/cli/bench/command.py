@@ -11,7 +11,7 @@ from typing import Any
 from dubins_rrt_ros.planning import Settings
 from dubins_rrt_ros.planning.option import option
 
-from ..common.flags import add_option_flags, given_options, largest
+from ..common.flags import add_option_flags, add_paper_flag, given_settings, largest
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
@@ -57,6 +57,7 @@ def add_arguments(parser: Parser) -> None:
     add_json_flag(parser, "what the runs amount to")
     _add_measuring(parser.add_argument_group("measuring"))
     add_option_flags(parser, "settings", _Flags)
+    add_paper_flag(parser)
     _add_report(parser.add_argument_group("report"))
 
 
@@ -143,7 +144,7 @@ def _runs_of(case: Case, arguments: argparse.Namespace) -> Iterator[BenchRun]:
 
 def _settings(arguments: argparse.Namespace, of_problem: Mapping[str, Any]) -> Settings:
     """Return the settings of a problem's runs: flags come before what its file gives, and that before the defaults."""
-    given = dict(of_problem) | given_options(arguments, _Flags)
+    given = dict(of_problem) | given_settings(arguments, _Flags)
     if "time" in arguments:
         given["planning_time"] = arguments.time
     default_time = MAX_TIME if "samples" in given else DEFAULT_TIME

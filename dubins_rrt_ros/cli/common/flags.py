@@ -3,8 +3,9 @@
 import argparse
 from typing import Any
 
-from dubins_rrt_ros.planning import options
+from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.option import Option
+from dubins_rrt_ros.planning.settings import PAPER
 
 
 def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type) -> None:
@@ -12,7 +13,7 @@ def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type) -> 
     group = parser.add_argument_group(title)
     for item in options(cls):
         text = f"{item.describe()}; default {_shown_default(item)}".replace("%", "%%")
-        group.add_argument("--" + item.name.replace("_", "-"), default=argparse.SUPPRESS, help=text, **_keywords(item))
+        group.add_argument(flag(item.name), default=argparse.SUPPRESS, help=text, **_keywords(item))
 
 
 def _shown_default(item: Option) -> str:
@@ -33,6 +34,23 @@ def _keywords(item: Option) -> dict[str, Any]:
 def given_options(arguments: argparse.Namespace, cls: type) -> dict[str, Any]:
     """Return the options of `cls` that were given on the command line, by name."""
     return {item.name: getattr(arguments, item.name) for item in options(cls) if item.name in arguments}
+
+
+def flag(name: str) -> str:
+    """Return the flag of an option, such as --turning-radius for turning_radius."""
+    return "--" + name.replace("_", "-")
+
+
+def add_paper_flag(parser: argparse.ArgumentParser) -> None:
+    """Give `parser` the flag --paper."""
+    parser.add_argument("--paper", action="store_true", default=argparse.SUPPRESS,
+                        help="the paper's plain RRT and RRT*: --no-informed --no-shortcut --heading-sampling uniform")
+
+
+def given_settings(arguments: argparse.Namespace, cls: type = Settings) -> dict[str, Any]:
+    """Return the settings that were given on the command line, by flags or by --paper, as the options of `cls`."""
+    preset = PAPER if "paper" in arguments else {}
+    return preset | given_options(arguments, cls)
 
 
 def largest(cls: type, name: str) -> Any:

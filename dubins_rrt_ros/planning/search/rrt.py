@@ -70,6 +70,7 @@ class Search:
     Attributes:
         samples: number of samples used so far.
         best: the node that reaches the goal at the least cost, or -1.
+        found_by: what found the path there, before it was smoothed: hybrid_astar, rrt or rrt_star; "" without one.
     """
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None):
@@ -79,6 +80,7 @@ class Search:
         vehicle = problem.vehicle
         self.samples = 0
         self.best = -1
+        self.found_by = ""
         self._problem, self._settings = problem, settings
         self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
         self._kernel = RrtKernel(
@@ -218,10 +220,13 @@ class Search:
         started = time.perf_counter()
         # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
         is_rrt = self._is_rrt or (self._runs is not None and self.best < 0)
+        before = self.cost
         next_one = (self._kernel.rrt if is_rrt else self._kernel.rrt_star)(block, begin, end)
         took, taken = time.perf_counter() - started, next_one - begin
         self.samples += taken
         self.best = self._kernel.best_goal_node()
+        if self.cost < before:
+            self.found_by = "rrt" if is_rrt else "rrt_star"
         return next_one, min(max(1, int(BATCH_TIME * taken / max(took, 1e-6))), 2 * size, BLOCK)
 
     def _end_block(self) -> None:
@@ -273,6 +278,7 @@ class Search:
         """Add a path that hybrid A* found to the tree, if it is the best."""
         if path is not None and path_cost(path) < self.cost:
             self._insert(path, self.best if self._problem.exact_goal else -1)
+            self.found_by = "hybrid_astar"
 
     def _insert(self, path: Path, end: int) -> None:
         """Add a path to the tree; `end` is the node at its end, or -1 where the tree has none."""
