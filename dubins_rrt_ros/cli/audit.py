@@ -10,9 +10,12 @@ import numpy as np
 
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Problem, Vehicle, audit_path, values
+from dubins_rrt_ros.planning.audit.document import document_findings, pose_findings, unjudged_fields
 from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
+from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
+from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
-from dubins_rrt_ros.planning.text import quoted
+from dubins_rrt_ros.planning.text import one_line, quoted
 
 from .common.documents import read_json
 from .common.example import ENDS, MAP
@@ -23,8 +26,8 @@ from .common.request import add_map_arguments, map_options, read_map
 
 #: Default tolerances of poses [m, rad]: ample for four digits behind the point.
 TOLERANCE_XY, TOLERANCE_YAW = 1e-3, 1e-3
-#: Largest number in a pose that is taken [m, rad].
-LARGEST = 1e6
+#: Largest absolute numbers of a pose (x [m], y [m], yaw [rad]) that are taken.
+LARGEST = (MAX_COORDINATE, MAX_COORDINATE, LARGEST_YAW)
 #: Options of a plan's vehicle that a flag overrides, and their values then.
 _OVERRIDES: Mapping[str, Mapping[str, Any]] = {
     "turning_radius": {"wheelbase": 0.0, "max_steering_angle": 0.0}, "robot_radius": {"footprint": ""}}
@@ -37,11 +40,13 @@ class Verdict(NamedTuple):
         problem: the problem that the path should solve.
         length: the length of the path [m].
         audit: what the audit found.
+        not_judged: the fields of a plan's document that nothing was compared with.
     """
 
     problem: Problem
     length: float
     audit: Audit
+    not_judged: tuple[str, ...] = ()
 
 
 def add_arguments(parser: Parser) -> None:
@@ -52,7 +57,8 @@ def add_arguments(parser: Parser) -> None:
                     "its turning radius, and whether all that the vehicle sweeps, between poses too, is clear of the obstacles.",
         notes="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
               "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
-              "of constant curvature from each to the next, with the vehicle that the flags describe.",
+              "of constant curvature from each to the next, with the vehicle that the flags describe. All that a plan's file "
+              "says is compared with its curves and the map, its poses too; what cannot be is named as not judged.",
         examples=[f"dubins_rrt plan {MAP} {ENDS} --json plan.json", f"dubins_rrt audit plan.json {MAP}",
                   "echo '[[1.5, 2, 1.5708], [1.5, 3, 1.5708], [1.5, 4, 1.5708]]' > theirs.json",
                   f"dubins_rrt audit theirs.json {MAP} --turning-radius 1 --footprint "
@@ -61,6 +67,8 @@ def add_arguments(parser: Parser) -> None:
     parser.argument_default = argparse.SUPPRESS
     parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
     add_map_arguments(parser)
+    parser.add_argument("--any-map", action="store_true", default=False,
+                        help="judge a plan on another map than that on which it was planned")
     add_json_flag(parser, "the verdict")
     for name, text in (("--start", "pose at which the path must begin"), ("--goal", "pose at which it must end")):
         parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), help=f"{text} [m, m, rad]; default: the plan's")
@@ -104,15 +112,22 @@ def _judge(arguments: argparse.Namespace) -> Verdict:
 
 
 def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse.Namespace) -> Verdict:
-    problem, _ = read_request(document, world_map)
+    problem, settings = read_request(document, world_map)
     path = read_path(document)
     if path is None:
         raise PlanFileError(f"it holds no path but {quoted(document.get('error_name'))}; there is nothing to judge")
-    given = given_options(arguments, Vehicle)
+    given, of_request = given_options(arguments, Vehicle), given_options(arguments, Problem)
     replaced = {name: value for flag in given for name, value in _OVERRIDES.get(flag, {}).items()}
-    problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments),
-                      **given_options(arguments, Problem))
-    return Verdict(problem, path.length, audit_path(path, problem))
+    problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments), **of_request)
+    found = audit_path(path, problem)
+    # With other things than it was planned with its clearance is another.
+    others = ["min_clearance"] if given or of_request or arguments.any_map else []
+    others += ["map_id"] if arguments.any_map else []
+    findings = document_findings({name: value for name, value in document.items() if name not in others}, path, found,
+                                 world_map.id)
+    along = () if math.isinf(found.max_curvature) else pose_findings(_poses(document), path, settings.path_spacing)
+    return Verdict(problem, path.length, replace(found, findings=(*found.findings, *along, *findings)),
+                   tuple(unjudged_fields(document, others)))
 
 
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:
@@ -133,9 +148,10 @@ def _poses(document: Any) -> np.ndarray:
     if not (isinstance(poses, list) and poses):
         raise PlanFileError('it holds no poses; give [[x, y, yaw], ...] or {"poses": [[x, y, yaw], ...]}, one pose at least')
     for i, pose in enumerate(poses):
-        if not (isinstance(pose, list) and len(pose) == 3 and all(type(n) in (int, float) and abs(n) <= LARGEST for n in pose)):
-            raise PlanFileError(f"pose {i} is {quoted(pose)}; give three numbers, x [m], y [m] and yaw [rad], none beyond "
-                                f"{LARGEST:g}")
+        if not (isinstance(pose, list) and len(pose) == 3
+                and all(type(n) in (int, float) and abs(n) <= most for n, most in zip(pose, LARGEST, strict=True))):
+            raise PlanFileError(f"pose {i} is {quoted(pose)}; give three numbers, x [m] and y [m], none beyond {LARGEST[0]:g}, "
+                                f"and yaw [rad], none beyond {LARGEST[2]:g}")
     return np.array(poses, dtype=float)
 
 
@@ -147,13 +163,15 @@ def _sentence(file: str, verdict: Verdict) -> str:
     required = "of its footprint" if vehicle.footprint else f"for a robot radius of {vehicle.robot_radius:g} m"
     return (f"{file} {'passes' if found.ok else count}: length {verdict.length:.3f} m, least clearance "
             f"{found.min_clearance:.4f} m {required}, greatest curvature {found.max_curvature:.4f} 1/m for a turning radius of "
-            f"{vehicle.turning_radius:g} m.")
+            f"{vehicle.turning_radius:g} m." + (f" Not judged: {one_line(', '.join(verdict.not_judged))}." if verdict.not_judged
+                                                else ""))
 
 
 def _document(verdict: Verdict, map_name: str) -> dict[str, Any]:
     """Return the verdict as JSON holds it."""
     problem, found = verdict.problem, verdict.audit
-    return {"ok": found.ok, "findings": list(found.findings), "length": verdict.length,
+    return {"ok": found.ok, "findings": list(found.findings), "not_judged": list(verdict.not_judged),
+            "length": verdict.length,
             "min_clearance": found.min_clearance, "max_curvature": found.max_curvature,
             "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
             "vehicle": values(problem.vehicle), "request": values(problem), "version": __version__}

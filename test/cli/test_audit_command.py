@@ -89,7 +89,58 @@ def test_flags_replace_what_a_plan_says_of_the_vehicle(document, capsys):
 def test_a_plan_is_judged_on_the_map_that_is_given(document, capsys):
     Path("other.wkt").write_text((HALL - shapely.box(4, 6, 7, 10)).wkt)
     status, out, _ = run(write(document), "other.wkt", capsys=capsys)
-    assert status == 1 and "less than the robot's radius" in out.splitlines()[1]
+    assert status == 1 and "less than the robot's radius" in out.splitlines()[1] and "it was planned on another one" in out
+    Path("other.wkt").write_text((HALL - shapely.box(0, 9.99, 0.01, 10)).wkt)
+    assert run(write(document), "other.wkt", capsys=capsys)[0] == 1
+    assert run(write(document), "other.wkt", "--any-map", capsys=capsys)[0] == 0
+
+
+def test_the_poses_of_a_plan_are_judged_for_they_are_driven(document, capsys):
+    def moved(pose, x=0.0, y=0.0, yaw=0.0):
+        return [pose[0] + x, pose[1] + y, pose[2] + yaw]
+
+    good, count = document["poses"], len(document["poses"])
+    for wrong, says in (
+            ([good[0], *(moved(pose, y=-3.0) for pose in good[1:-1]), good[-1]], f"{count - 2} of {count} poses are off"),
+            ([good[0], *(moved(pose, x=9e8) for pose in good[1:-1]), good[-1]], f"{count - 2} of {count} poses are off"),
+            ([*good[:9], moved(good[9], yaw=1e-3), *good[10:]], "pose 9 at "),
+            ([*good[:9], moved(good[9], x=1e-5), *good[10:]], "pose 9 at "),
+            ([*good[:20], good[19], good[10], *good[20:]], "pose 21 at "),
+            ([*good[:20], *good[22:]], "more than path_spacing, 0.05 m"), ([good[0], good[-1]], "more than path_spacing")):
+        status, out, _ = run(write(document | {"poses": wrong}), "hall.wkt", capsys=capsys)
+        assert status == 1 and says in out, says
+
+
+def test_every_joint_of_a_plan_is_among_its_poses(document, capsys):
+    first = document["curves"][0]
+    joint = next(i for i, pose in enumerate(document["poses"])
+                 if abs(np.hypot(*np.subtract(pose, document["poses"][0])[:2])) > 0 and i * 0.05 > first["lengths"][0]) - 1
+    settings = document["settings"] | {"path_spacing": 1.0}
+    without = [pose for i, pose in enumerate(document["poses"]) if not joint - 1 <= i <= joint + 1]
+    status, out, _ = run(write(document | {"poses": without, "settings": settings}), "hall.wkt", capsys=capsys)
+    assert status == 1 and "no pose is where the curvature changes" in out
+
+
+@pytest.mark.parametrize(("field", "value"), [
+    ("length", 12.0), ("length", "long"), ("length", None), ("lower_bound", 1e3), ("lower_bound", -1.0), ("lower_bound", 1.0),
+    ("gap", 0.0), ("gap", None), ("min_clearance", 1.5), ("max_curvature", 0.5), ("error_code", 208), ("error_name", "TIMEOUT"),
+    ("audit", "fine"), ("map_id", "0123456789ab"), ("planner", "rrt"), ("seed", 99)])
+def test_a_figure_that_is_not_the_path_s_is_found(document, field, value, capsys):
+    status, out, _ = run(write(document | {field: value}), "hall.wkt", capsys=capsys)
+    verdict, finding = out.splitlines()
+    assert status == 1 and "fails with 1 finding: " in verdict
+    assert field in finding or (field == "lower_bound" and finding.startswith("gap is "))
+
+
+def test_what_is_not_judged_is_named(document, capsys):
+    file = write(document | {"colour": "red"})
+    status, out, _ = run(file, "hall.wkt", "--json", "verdict.json", capsys=capsys)
+    named = ["message", "samples", "tree_nodes", "time_to_first", "planning_time", "map_time",
+             "lower_bound (that no path is shorter)", "map", "version", "colour"]
+    assert status == 0 and out.endswith(f"Not judged: {', '.join(named)}.\n")
+    assert json.loads(Path("verdict.json").read_text())["not_judged"] == named
+    status, out, _ = run(file, "hall.wkt", "--robot-radius", "0.25", capsys=capsys)
+    assert status == 0 and "min_clearance" in out.split("Not judged: ")[1]
 
 
 def test_a_document_that_holds_no_plan_with_a_path_takes_one_line(document, capsys):

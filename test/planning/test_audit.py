@@ -293,6 +293,19 @@ def test_a_map_is_not_kept_alive(kind):
     assert kept() is None
 
 
+def test_joints_that_each_creep_are_found():
+    """Two thousand joints of 0.9 micrometres to the side, each less than the tolerance of one."""
+    step, creep, count = 0.005, 9e-7, 2000
+    curves = [DubinsCurve((i * step, i * creep, 0.0), 1.0, "LSL", (0.0, step, 0.0)) for i in range(count)]
+    start, end = (0.0, 0.0, 0.0), (count * step, (count - 1) * creep, 0.0)
+    problem = Problem(GridMap(np.zeros((40, 240)), 0.1, (-2.0, -2.0, 0.0)), Vehicle(robot_radius=0.1), start, end)
+    found = audit_function(Path.of_curves(start, end, curves), problem)
+    assert found.findings == ("at its joints the path jumps by 0.0017991 m and 0 rad in all",)
+    straight = [DubinsCurve((i * step, 0.0, 0.0), 1.0, "LSL", (0.0, step, 0.0)) for i in range(count)]
+    end = straight[-1].end
+    assert audit_function(Path.of_curves(start, end, straight), replace(problem, goal=end)).ok
+
+
 def test_the_audit_shares_no_code_with_the_planner():
     own = sorted(File(audit_function.__globals__["__file__"]).parent.glob("*.py"))
     imported = set()
@@ -301,8 +314,8 @@ def test_the_audit_shares_no_code_with_the_planner():
             imported.add("." * node.level + (node.module or ""))
         elif isinstance(node, ast.Import):
             imported.update(name.name for name in node.names)
-    assert len(own) == 6
+    assert len(own) == 7
     libraries = {"math", "dataclasses", "weakref", "collections.abc", "typing", "numpy", "shapely"}
     # Of curves only the types, for a type checker.
     assert imported - {f".{file.stem}" for file in own} - libraries == {
-        "..curves.dubins", "..curves.path", "..maps.model", "..problem", "..vehicle"}
+        "..curves.dubins", "..curves.path", "..maps.model", "..option", "..problem", "..text", "..vehicle"}

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Maximum error of a joint between two curves [m, rad], and of a turning radius, relatively.
 TOLERANCE = 1e-6
+#: Largest sum of what curves end from where the next ones begin [m, rad].
+CREEP = 10 * TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -110,11 +112,15 @@ def goal_findings(end: Pose, problem: Problem, tolerance_xy: float = TOLERANCE, 
 def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[str]:
     before = np.vstack([[path.start], ends])
     after = np.vstack([starts, [path.end]])
-    findings = []
+    findings, total_off, total_turned = [], 0.0, 0.0
     for i, (a, b) in enumerate(zip(before, after, strict=True)):
         off, turned = apart(a, b)
+        total_off, total_turned = total_off + off, total_turned + turned
         if not (off <= TOLERANCE and turned <= TOLERANCE):
             findings.append(f"before curve {i} the path jumps by {off:.6g} m and {turned:.6g} rad at ({a[0]:.3f}, {a[1]:.3f})")
+    rounding = 8 * np.finfo(float).eps * len(after) * float(np.abs(after[:, :2]).max())
+    if not findings and not (total_off <= CREEP + rounding and total_turned <= CREEP):
+        findings.append(f"at its joints the path jumps by {total_off:.6g} m and {total_turned:.6g} rad in all")
     return findings
 
 
