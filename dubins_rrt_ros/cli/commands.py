@@ -30,6 +30,7 @@ COMMANDS = {
     "bench": Command("measure the planner on a file of problems, and compare", "dubins_rrt_ros.cli.bench.command"),
     "campaign": Command("try to prove the planner wrong with random problems", "dubins_rrt_ros.evaluation.campaign.command"),
     "demo": Command("see the ROS node plan in the maze", "dubins_rrt_ros.cli.demo.command"),
+    "families": Command("plan problems that are solvable by construction", "dubins_rrt_ros.evaluation.families.command"),
     "figures": Command("draw the figures of the documentation", "dubins_rrt_ros.evaluation.figures.command"),
     "paper": Command("measure again what the paper measured", "dubins_rrt_ros.evaluation.paper.command"),
     "render": Command("make a map_server pair of a polygon map", "dubins_rrt_ros.cli.render"),
