@@ -158,3 +158,22 @@ def test_bad_wkt(text, word):
     assert message.startswith("geometry ")
     assert word in message
     assert any(remedy in message.split("; ")[-1] for remedy in ("give", "correct", "mend"))
+
+
+def garden(x, y, width, height):
+    return [[x, y], [x + width, y], [x + width, y + height], [x, y + height], [x, y]]
+
+
+@pytest.mark.parametrize("ring", [
+    garden(8.6, 50.1, 0.0003, 0.0002), garden(-122.42, 37.77, 0.01, 0.3), garden(151.2, -33.9, 0.4, 0.4)])
+def test_coordinates_in_degrees_are_refused(ring):
+    wkt = f"POLYGON (({', '.join(f'{x} {y}' for x, y in ring)}))"
+    for read in (lambda: free_space(feature([ring], role="bounds", name="garden")), lambda: parse_wkt(wkt, "garden.wkt")):
+        with pytest.raises(MapError, match="these look like degrees; give metres"):
+            read()
+
+
+@pytest.mark.parametrize("ring", [
+    garden(0, 0, 0.3, 0.3), garden(-0.1, -0.1, 0.2, 0.2), garden(8.6, 50.1, 0.6, 0.4), garden(476000, 5550000, 0.2, 0.2)])
+def test_small_maps_and_far_ones_in_metres_are_taken(ring):
+    assert free_space(feature([ring], role="bounds")).area > 0

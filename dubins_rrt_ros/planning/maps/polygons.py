@@ -1,6 +1,7 @@
 """Free space as polygons from the text of a GeoJSON or WKT file."""
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -13,6 +14,8 @@ from .errors import MapError
 from .free_space import MAX_COORDINATE, free_space, valid
 from .model import PolygonMap
 
+#: Size of a map below which its coordinates may be degrees, and how many times further from (0, 0) it is then, at least.
+_SIZE_IN_DEGREES, _TIMES_FURTHER = 0.5, 20
 _POLYGONS = ("Polygon", "MultiPolygon")
 
 
@@ -20,7 +23,8 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
     """Read the free space of a GeoJSON FeatureCollection in metres: the bounds less the union of the obstacles.
 
     The one feature with the property `"role": "bounds"` is the bounds, every other an obstacle; a hole of an obstacle
-    is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored.
+    is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored. Coordinates
+    that look like degrees are refused.
 
     Raises:
         MapError: the text is no such collection, or a ring is not valid; names the feature and the ring.
@@ -35,6 +39,7 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
     if len(bounds) != 1:
         found = ", ".join(label for label, _ in bounds[:5]) or "none"
         raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
+    _refuse_degrees(bounds[0][1], bounds[0][0])
     return PolygonMap(free_space(bounds[0][1], [geometry for _, geometry in obstacles], "features"), name=name)
 
 
@@ -64,7 +69,18 @@ def parse_wkt(text: str, name: str) -> PolygonMap:
         raise MapError(f"geometry has the coordinate {bad[0]}; give {allowed}")
     if shapely.is_empty(valid(free, "geometry")):
         raise MapError("geometry is empty; give a polygon with an area")
+    _refuse_degrees(free, "geometry")
     return PolygonMap(free, name=name)
+
+
+def _refuse_degrees(bounds: shapely.Geometry, label: str) -> None:
+    """Refuse bounds that are those of a place on the globe, in degrees: small, and far from (0, 0)."""
+    west, south, east, north = shapely.bounds(bounds).tolist()
+    size = max(east - west, north - south)
+    on_globe = max(abs(west), abs(east)) <= 180 and max(abs(south), abs(north)) <= 90
+    if on_globe and size < _SIZE_IN_DEGREES and math.hypot(west, south) > _TIMES_FURTHER * size:
+        raise MapError(f"{label} is {east - west:.2g} x {north - south:.2g} large and around ({(west + east) / 2:.6g}, "
+                       f"{(south + north) / 2:.6g}): these look like degrees; give metres, as of a projection such as UTM")
 
 
 def _parse_json(text: str) -> Any:
