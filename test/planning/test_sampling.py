@@ -171,3 +171,15 @@ def test_nodes_are_added_only_where_a_path_shorter_than_the_best_may_lead(shortc
     for size, length in at_blocks:
         # Of a path that was inserted the nodes lie below its own length.
         assert drawing.bound(nodes[size:]).max(initial=0) <= length + 1e-9
+
+
+@pytest.mark.parametrize("informed", [True, False])
+def test_samples_fall_where_the_start_can_reach(informed):
+    """Informed ones; the paper's fall everywhere that may be free."""
+    cells = np.zeros((60, 100))
+    cells[:, 20] = 100
+    problem = Problem(GridMap(cells, 0.1), Vehicle(0.5, 0.2), (1.0, 1.0, 0.0), (1.0, 5.0, 0.0))
+    sampler = Sampler(problem, Settings(informed=informed, heading_sampling="uniform", goal_bias=0.0, seed=1),
+                      ClearanceField(problem.map), None)
+    beyond = (sampler.draw(512)[:, 0] > 2.0).mean()
+    assert (beyond == 0) == informed

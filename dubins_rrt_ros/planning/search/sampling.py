@@ -63,16 +63,25 @@ class Sampler:
         return poses
 
     def _anywhere(self, count: int) -> np.ndarray:
-        """Draw (count, 2) positions that may be free, as far as such are found."""
+        """Draw (count, 2) positions that may be reached, as far as such are found."""
         kept: list[np.ndarray] = []
         missing = count
         for _ in range(TRIALS):
             drawn = self._corner + self._rng.random((count, 2)) @ self._sides
-            kept.append(drawn[self._field.may_be_free(drawn, self._problem.vehicle.inscribed_radius)][:missing])
+            kept.append(drawn[self._may_be_reached(drawn)][:missing])
             missing -= len(kept[-1])
             if missing == 0:
                 break
         return np.concatenate([*kept, drawn[:missing]])
+
+    def _may_be_reached(self, points: np.ndarray) -> np.ndarray:
+        """Return (n,) bool: True where (n, 2) points may be free and, unless the sampling is plain, connected with the start."""
+        required_clearance = self._problem.vehicle.inscribed_radius
+        if self._settings.informed:
+            components = self._field.components(required_clearance)
+            if of_start := components[self._field.cells(np.array(self._problem.start[:2]))]:
+                return np.asarray(components[self._field.cells(points)] == of_start)
+        return self._field.may_be_free(points, required_clearance)
 
     def _where_cheaper(self, count: int, from_start: CostToGo, cost: float) -> np.ndarray:
         """Draw (count, 2) positions over which a path may cost less than `cost`; anywhere, where there are none."""
