@@ -15,9 +15,10 @@ from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
 from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
+from dubins_rrt_ros.planning.result import pose_spacing
 from dubins_rrt_ros.planning.text import one_line, quoted
 
-from .common.documents import read_json
+from .common.documents import read_poses_or_json
 from .common.example import ENDS, MAP
 from .common.flags import add_option_flags, given_options
 from .common.output import check_folder, finite, words_for, write_document
@@ -65,7 +66,8 @@ def add_arguments(parser: Parser) -> None:
                   "'[[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]'"],
         exit_status="0 it passes, 1 there are findings, one a line after the verdict, 2 wrong usage")
     parser.argument_default = argparse.SUPPRESS
-    parser.add_argument("path", metavar="PATH.json", help="a plan, or poses")
+    parser.add_argument("path", metavar="PATH.json",
+                        help="a plan, or poses: JSON, the CSV of plan --csv, or an echoed nav_msgs/Path")
     add_map_arguments(parser)
     parser.add_argument("--any-map", action="store_true", default=False,
                         help="judge a plan on another map than that on which it was planned")
@@ -101,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _judge(arguments: argparse.Namespace) -> Verdict:
-    document = read_json(arguments.path)
+    document = read_poses_or_json(arguments.path)
     world_map, _ = read_map(arguments.map, **map_options(arguments))
     try:
         if isinstance(document, Mapping) and "curves" in document:
@@ -113,6 +115,7 @@ def _judge(arguments: argparse.Namespace) -> Verdict:
 
 def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse.Namespace) -> Verdict:
     problem, settings = read_request(document, world_map)
+    spacing = settings.path_spacing if arguments.any_map else pose_spacing(problem, settings)
     path = read_path(document)
     if path is None:
         raise PlanFileError(f"it holds no path but {quoted(document.get('error_name'))}; there is nothing to judge")
@@ -125,7 +128,7 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
     others += ["map_id"] if arguments.any_map else []
     findings = document_findings({name: value for name, value in document.items() if name not in others}, path, found,
                                  world_map.id)
-    along = () if math.isinf(found.max_curvature) else pose_findings(_poses(document), path, settings.path_spacing)
+    along = () if math.isinf(found.max_curvature) else pose_findings(_poses(document), path, spacing)
     return Verdict(problem, path.length, replace(found, findings=(*found.findings, *along, *findings)),
                    tuple(unjudged_fields(document, others)))
 

@@ -103,9 +103,7 @@ class Plan:
     @property
     def path_spacing(self) -> float:
         """The maximum distance between two of the poses [m]: that of the settings, or a fine one where that is 0."""
-        world_map, vehicle = self.problem.map, self.problem.vehicle
-        detail = world_map.resolution if isinstance(world_map, GridMap) else vehicle.inscribed_radius / 4
-        return self.settings.path_spacing or max(MIN_FINE_SPACING, min(detail, vehicle.turning_radius / 10))
+        return pose_spacing(self.problem, self.settings)
 
     @property
     def min_clearance(self) -> float | None:
@@ -191,6 +189,13 @@ class Plan:
         """Return True if a node of the tree is reached by just this path."""
         ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path_cost(path))
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
+
+
+def pose_spacing(problem: Problem, settings: Settings) -> float:
+    """Return the maximum distance between two poses of a path [m]: that of the settings, or a fine one where that is 0."""
+    world_map, vehicle = problem.map, problem.vehicle
+    detail = world_map.resolution if isinstance(world_map, GridMap) else vehicle.inscribed_radius / 4
+    return settings.path_spacing or max(MIN_FINE_SPACING, min(detail, vehicle.turning_radius / 10))
 
 
 def reaches_goal(pose: Pose, problem: Problem, rounding: float) -> bool:

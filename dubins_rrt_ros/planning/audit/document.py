@@ -102,7 +102,7 @@ def _gap_findings(places: np.ndarray, begins: np.ndarray, curvature: np.ndarray,
     steps = np.diff(places)
     if spacing > 0 and len(steps) and steps.max() > spacing + 2 * TOLERANCE:
         k = int(np.argmax(steps))
-        yield f"from pose {k} to pose {k + 1} are {steps[k]:.6g} m, more than path_spacing, {spacing:g} m"
+        yield f"from pose {k} to pose {k + 1} are {steps[k]:.6g} m, more than the {spacing:g} m of path_spacing"
     bends = np.flatnonzero(np.diff(curvature)) + 1
     nearest = np.abs(places - begins[bends][:, None]).min(axis=1) if len(bends) else np.empty(0)
     left_out = np.flatnonzero(nearest > 2 * TOLERANCE)
