@@ -81,12 +81,12 @@ def load_picture(path: Path, options: ReadOptions) -> GridMap:
     """Load a picture that comes without a YAML file: by the default rules, its lower left corner at (0, 0).
 
     Raises:
-        MapMetadataError: there is no resolution, or it is out of range.
-        MapError: the picture cannot be used.
+        MapMetadataError: the resolution is out of range.
+        MapError: there is no resolution, or the picture cannot be used.
     """
     if options.resolution is None:
-        raise MapMetadataError("is a picture; give the side of its cells in metres, such as resolution=0.05 (--resolution 0.05), "
-                               "or the YAML file that names it")
+        raise MapError(f"the ending {path.suffix!r} is a picture's; give the side of its cells in metres, such as "
+                       "resolution=0.05 (--resolution 0.05), or the .yaml file that names it")
     cells, warnings = cells_of(_read_picture(path, options), Rules(), options.unknown_grey)
     return GridMap(cells, options.resolution, name=path.name, percent=True, warnings=warnings)
 
