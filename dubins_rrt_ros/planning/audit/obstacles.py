@@ -63,7 +63,7 @@ class GridObstacles:
         x0, y0, yaw = self._origin
         rows, columns = self._data.shape
         place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
-        to_edge = np.minimum.reduce([place.real, columns - place.real, place.imag, rows - place.imag])
+        to_edge = np.min([place.real, columns - place.real, place.imag, rows - place.imag], axis=0)
         out = np.where(to_edge > 0, to_edge, 0.0)
         reach, undecided = FIRST_REACH, np.flatnonzero(out)
         while len(undecided):
@@ -159,7 +159,7 @@ class PathsideSquares:
         """
         place = self._place(corners)
         rows, columns = self._grid.data.shape
-        to_edge = np.minimum.reduce([place.real, columns - place.real, place.imag, rows - place.imag]).min(axis=1)
+        to_edge = np.min([place.real, columns - place.real, place.imag, rows - place.imag], axis=(0, 2))
         out = np.where(to_edge > 0, to_edge, 0.0)
         inside = np.flatnonzero(out)
         if len(self._tree):

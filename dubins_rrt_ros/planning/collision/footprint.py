@@ -102,9 +102,9 @@ def _ear(corners: np.ndarray) -> int:
     flat = np.flatnonzero(turns == 0)
     if len(flat):
         return int(flat[0])
-    for ear in np.flatnonzero(turns > 0):
-        triangle = shapely.Polygon(corners[[ear - 1, ear, (ear + 1) % len(corners)]])
-        others = np.delete(corners, [ear - 1, ear, (ear + 1) % len(corners)], axis=0)
+    for ear in np.flatnonzero(turns > 0).tolist():
+        indices = [ear - 1, ear, (ear + 1) % len(corners)]
+        triangle, others = shapely.Polygon(corners[indices]), np.delete(corners, indices, axis=0)
         if not shapely.intersects_xy(triangle, others).any():
             return int(ear)
     return int(np.argmax(turns))  # only rounding can bring us here

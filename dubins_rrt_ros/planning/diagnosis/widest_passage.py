@@ -148,4 +148,4 @@ def _coarsened(grid: GridMap, factor: int) -> GridMap:
 
 def _any_of_blocks(cells: np.ndarray, factor: int) -> np.ndarray:
     rows, columns = (np.arange(0, n, factor) for n in cells.shape)
-    return np.logical_or.reduceat(np.logical_or.reduceat(cells, rows, axis=0), columns, axis=1)
+    return np.asarray(np.logical_or.reduceat(np.logical_or.reduceat(cells, rows, axis=0), columns, axis=1))
