@@ -234,7 +234,8 @@ def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
         return DiagnosticStatus.ERROR
     if plan is None or plan.path is None:
         return DiagnosticStatus.OK
-    approximate = not plan.problem.exact_goal and plan.path.end != plan.problem.goal
+    compared = 2 if plan.problem.any_goal_heading else 3
+    approximate = not plan.problem.exact_goal and plan.path.end[:compared] != plan.problem.goal[:compared]
     return DiagnosticStatus.WARN if approximate or plan.cancelled else DiagnosticStatus.OK
 
 

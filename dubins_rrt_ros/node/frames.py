@@ -55,6 +55,8 @@ class Frames:
                 self._logger.warning(doubt)
 
     def _latest(self, name: str, frame: str) -> Transform:
+        if frame.startswith("/"):
+            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or")
         if tf2_ros is None:
             raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or")
         try:

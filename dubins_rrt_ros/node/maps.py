@@ -132,12 +132,20 @@ class Maps:
 
     # Maps
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know of how the newest map's file was understood."""
+        return self.map.warnings if isinstance(self.map, GridMap) else ()
+
     def take(self, world_map: Map, grid: GridMap, by_topic: bool = False) -> None:
         """Plan on this map, which looks like this grid, from now on."""
         self.map, self.grid, self.refusal = world_map, grid, ""
         self._came_by_topic = by_topic
         height, width = grid.data.shape
-        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {one_line(world_map.name)}")
+        shares = "" if by_topic else f", {grid.describe_cells()}"  # which takes too long for each map of a stream
+        self._node.get_logger().info(f"Took a map of {width} x {height} cells: {one_line(world_map.name)}{shares}")
+        for warning in self.warnings:
+            self._node.get_logger().warning(warning)
         self._newest_world()
         if self._publisher is not None:
             self._publisher.publish(self.message(grid))
@@ -202,7 +210,9 @@ class Maps:
         return outcome
 
     def _load(self, name: str, directory: str) -> Loaded:
-        loaded = load_map(find_map(name), max_map_cells=self._options.max_map_cells, map_directory=directory)
+        options = self._options
+        loaded = load_map(find_map(name), max_map_cells=options.max_map_cells, map_directory=directory,
+                          unknown_grey=options.unknown_grey)
         return loaded, as_grid(loaded)
 
     def _post(self, receiver: Callable[[Any], None], outcome: object) -> None:

@@ -27,6 +27,7 @@ class Readiness:
         self.start: Pose | None = None
         self._start_refusal = ""  # why the last start was refused
         self._reported = ""  # what is missing, as it was logged last
+        self._seen_map: Map | None = None
         self._map_refusal = ""  # why the last map was refused while there was one, as it was reported
 
     # What planning needs
@@ -82,7 +83,7 @@ class Readiness:
 
         The first time a missing start is reported as status as well, and a refused map whenever there is an older one.
         """
-        self._report_refused_map()
+        self._report_map()
         before, self._reported = self._reported, self._missing()
         if self._reported == before:
             return False
@@ -90,13 +91,21 @@ class Readiness:
         if self._maps.map is None:
             self._outputs.report(Outcome(Status.NO_MAP, self._reported), log=False)
         elif self._outputs.status is None and self._reported:
-            self._outputs.report(Outcome(Status.NO_START, self._reported), log=False, map_id=self.map_id)
+            message = " ".join([self._reported, *self._maps.warnings])
+            self._outputs.report(Outcome(Status.NO_START, message), log=False, map_id=self.map_id)
         return True
 
-    def _report_refused_map(self) -> None:
-        """Report once, as a warning, that a map was refused and an older one is planned on; and when a newer one is taken."""
+    def _report_map(self) -> None:
+        """Report once, as warnings, what is odd about the newest map's file, and that a map was refused while there is an older.
+
+        When a newer one is taken after a refusal, that is reported too.
+        """
         if self._maps.map is None:
             return
+        if self._maps.map is not self._seen_map and self._maps.warnings and self._outputs.status is not None:
+            outcome = Outcome(Status.NONE, " ".join(self._maps.warnings), is_warning=True)
+            self._outputs.report(outcome, log=False, map_id=self.map_id)
+        self._seen_map = self._maps.map
         before, self._map_refusal = self._map_refusal, self._maps.refusal
         if self._map_refusal and self._map_refusal != before:
             message = f"Planning goes on on an older map.{self._map_refusal}"

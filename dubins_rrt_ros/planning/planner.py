@@ -222,6 +222,8 @@ class _Call:
         if self._problem.exact_goal:
             return message + "."
         off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)
+        if self._problem.any_goal_heading:
+            return f"{message}; it ends {off:.3f} m from the goal, with the heading {path.end[2]:.3f} rad."
         return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:

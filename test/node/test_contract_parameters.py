@@ -41,6 +41,7 @@ PARAMETERS = {
     "any_goal_heading": (BOOL, None, "no"),
     "path_spacing": (DOUBLE, 0.0, 0.0005),
     "seed": (INTEGER, -1, -2),
+    "unknown_grey": (INTEGER, -1, 256),
     "occupied_thresh": (DOUBLE, 0.65, 1.5),
     "free_thresh": (DOUBLE, 0.25, -0.1),
     "publish_tree": (BOOL, None, "no"),

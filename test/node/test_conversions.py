@@ -331,5 +331,8 @@ def test_an_approximate_or_cancelled_path_is_a_warning(plans):
     waypoints = np.vstack([plan.path.waypoints[:-1], (8.4, 5.0, 0.5)])
     approximate = replace(plan, problem=replace(plan.problem, goal_tolerance_xy=0.2),
                           path=replace(plan.path, waypoints=waypoints))
+    any_heading = replace(approximate, problem=replace(plan.problem, any_goal_heading=True),
+                          path=replace(plan.path, waypoints=np.vstack([plan.path.waypoints[:-1], (8.5, 5.0, 1.7)])))
+    assert status_message("/planner", Status.NONE, "", plan=any_heading).level == DiagnosticStatus.OK
     for doubtful in (cancelled, approximate):
         assert status_message("/planner", Status.NONE, "", plan=doubtful).level == DiagnosticStatus.WARN

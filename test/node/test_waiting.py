@@ -11,6 +11,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import LoadMap
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 from support.harness import occupancy, values_of
@@ -128,6 +129,30 @@ def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the
     client.statuses.clear()
     client.send("goal_pose", GOAL)
     assert client.status_of(2, samples="300")["error_name"] == "NONE"
+
+
+def test_unknown_space_that_counts_as_free_is_told_in_log_and_status(planners, tmp_path):
+    grey = np.full((120, 120), 205, np.uint8)
+    grey[10:110, 10:110] = 254
+    (tmp_path / "slam.pgm").write_bytes(b"P5\n120 120\n255\n" + grey.tobytes())
+    (tmp_path / "slam.yaml").write_text("image: slam.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+                                        "free_thresh: 0.25\n")
+    process = planners.start(map_file=str(tmp_path / "slam.yaml"), **QUICK)
+    client = planners.client()
+    warning = "30.56% of the cells have the grey 205, as unknown space has it, and are free by free_thresh"
+    told = client.status_of(0, error_name="NO_START")
+    assert told["level"] == DiagnosticStatus.WARN and warning in told["message"]
+    client.wait_for_word(warning)
+    client.wait_for_word("slam.yaml, 100.0% free, 0.0% occupied, 0.0% unknown")
+    assert process.output.count("[WARN]") == 1
+    client.call(LoadMap, "load_map", map_url="maze.yaml")
+    client.call(LoadMap, "load_map", map_url=str(tmp_path / "slam.yaml"))
+    event = client.wait_for(lambda: [s for s in client.statuses if values_of(s)["error_name"] == "NONE"], "the warning")[0]
+    assert event.level == DiagnosticStatus.WARN and warning in event.message
+
+    process = planners.start(map_file=str(tmp_path / "slam.yaml"), unknown_grey=205)
+    planners.client().wait_for_word("slam.yaml, 69.4% free, 0.0% occupied, 30.6% unknown")
+    assert "[WARN]" not in process.output
 
 
 def test_with_a_map_file_the_status_is_that_a_start_is_waited_for(planners, map_file):
