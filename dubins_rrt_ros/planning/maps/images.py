@@ -13,9 +13,9 @@ from PIL import BmpImagePlugin, Image, PngImagePlugin
 
 from .errors import MapError
 
-#: The longest plain (P2) PGM that is read, and how much each pixel may take of it, beyond the longest header [bytes].
+#: Maximum length of a plain (P2) PGM, and of a pixel in it, beyond the header [bytes].
 MAX_PLAIN_PGM_BYTES, PLAIN_PGM_BYTES_PER_PIXEL = 64 * 2**20, 16
-#: The longest PGM header, with its comments, that is read [bytes].
+#: Maximum length of a PGM header, with its comments [bytes].
 MAX_PGM_HEADER_BYTES = 64 * 2**10
 #: Size that the chunks of a PNG may have beyond twice the bytes of its pixels [bytes].
 PNG_SLACK = 2**20
