@@ -55,14 +55,13 @@ class NodeProcess:
         self._reader.join(DEADLINE)
         return status
 
-    def end(self, by: signal.Signals, again_after: float | None = None) -> tuple[int, float]:
-        """Its exit status after a signal, or two of them, and how long it took [s]."""
-        begin = time.monotonic()
+    def end(self, by: signal.Signals, again_after: float | None = None) -> int:
+        """Its exit status after a signal, or two of them."""
         self._process.send_signal(by)
         if again_after is not None:
             time.sleep(again_after)
             self._process.send_signal(by)
-        return self.wait(), time.monotonic() - begin
+        return self.wait()
 
     def kill(self) -> None:
         if self.running:
