@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 import shapely
 
@@ -177,3 +178,16 @@ def test_coordinates_in_degrees_are_refused(ring):
     garden(0, 0, 0.3, 0.3), garden(-0.1, -0.1, 0.2, 0.2), garden(8.6, 50.1, 0.6, 0.4), garden(476000, 5550000, 0.2, 0.2)])
 def test_small_maps_and_far_ones_in_metres_are_taken(ring):
     assert free_space(feature([ring], role="bounds")).area > 0
+
+
+@pytest.mark.parametrize("height", ["1e-300", "1e-9", "9e-4"])
+def test_a_sliver_is_refused(height):
+    with pytest.raises(MapError, match="sliver.wkt: the free space is 20 m x .* too thin for any vehicle; give metres"):
+        parse_wkt(f"POLYGON ((0 0, 20 0, 20 {height}, 0 {height}, 0 0))", "sliver.wkt")
+
+
+def test_polygons_of_too_many_vertices_are_refused_before_they_are_checked():
+    angle = np.linspace(0, 2 * np.pi, 500_000, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    with pytest.raises(MapError, match="vertices; simplify the polygons to 500000"):
+        PolygonMap(shapely.Polygon(ring))

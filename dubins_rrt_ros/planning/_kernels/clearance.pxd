@@ -1,5 +1,6 @@
 cimport cython
 from dubins_rrt_ros.planning._kernels.dubins cimport Pose
+from dubins_rrt_ros.planning._kernels.edge_tree cimport EdgeTree
 
 cdef class Clearance:
     cdef readonly float[:, ::1] field
@@ -34,6 +35,4 @@ cdef class GridClearance(Clearance):
 
 @cython.final
 cdef class PolygonClearance(Clearance):
-    cdef double[:, ::1] edges
-    cdef long long[::1] first_edge
-    cdef int[::1] edge_of
+    cdef EdgeTree edges

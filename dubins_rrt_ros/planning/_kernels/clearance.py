@@ -15,11 +15,13 @@ import cython
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import UNLIMITED, Pose, drive_from
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_tree import EdgeTree
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
     from .dubins import UNLIMITED, Pose, drive_from
+    from .edge_tree import EdgeTree
 
 
 @cython.cclass
@@ -219,98 +221,39 @@ class GridClearance(Clearance):
 
 @cython.cclass
 class PolygonClearance(Clearance):
-    """Clearance from the edges of polygons.
+    """Clearance from the edges of polygons, (m, 4): x, y, x, y of both ends in the raster's frame.
 
-    `edges` is (m, 4): x, y, x, y of both ends in the raster's frame. The nearest edge to any point of cell c is among
-    `edge_of[first_edge[c]:first_edge[c + 1]]`. The distance has no sign: an obstacle is entered only
-    through an edge.
+    The distance has no sign: an obstacle is entered only through an edge. A cell that an edge touches is 0 in the field.
     """
 
-    def __init__(self, field, resolution, origin, margin, edges, first_edge, edge_of):
+    def __init__(self, field, resolution, origin, margin, edges):
         Clearance.__init__(self, field, resolution, origin, margin)
-        self.edges = edges
-        self.first_edge = first_edge
-        self.edge_of = edge_of
+        self.edges = EdgeTree(edges)
 
     def exact(self, x, y):
         """Return the distance to the nearest edge."""
-        row: cython.int = self.row_of(y)
-        column: cython.int = self.column_of(x)
-        cell: cython.Py_ssize_t = row * self.field.shape[1] + column
-        nearest: cython.double = UNLIMITED
-        i: cython.Py_ssize_t
-        for i in range(self.first_edge[cell], self.first_edge[cell + 1]):
-            nearest = min(nearest, squared_to_segment(x, y, self.edges, self.edge_of[i]))
-        return sqrt(nearest)
+        return sqrt(self.edges.squared_distance(x, y))
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
-        """Return whether no edge is touched; one that is touched is the nearest of a cell in the spans."""
+        """Return whether no edge is touched; the point where one is lies in a cell of the spans that is not above 0."""
+        left: cython.int = cython.cast(cython.int, self.field.shape[1])
+        right: cython.int = -1
+        low: cython.int = last_row + 1
+        high: cython.int = -1
         row: cython.int
         column: cython.int
-        cell: cython.Py_ssize_t
-        i: cython.Py_ssize_t
         for row in range(first_row, last_row + 1):
             for column in range(self.column_of(spans[row, 0]), self.column_of(spans[row, 1]) + 1):
                 if self.field[row, column] > 0:
                     continue
-                cell = row * self.field.shape[1] + column
-                for i in range(self.first_edge[cell], self.first_edge[cell + 1]):
-                    if sweep_meets_segment(corners, first, end, along, across, self.edges, self.edge_of[i]):
-                        return False
-        return True
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def sweep_meets_segment(corners: cython.double[:, ::1], first: cython.int, end: cython.int, along: cython.double,
-                        across: cython.double, edges: cython.double[:, ::1], edge: cython.int) -> cython.bint:
-    """Return whether a convex polygon that moves straight touches an edge: no line along a side of either separates them."""
-    before: cython.int = end - 1
-    i: cython.int
-    for i in range(first, end):
-        if lies_beyond(corners[i, 1] - corners[before, 1], corners[before, 0] - corners[i, 0], corners, first, end, along, across,
-                       edges, edge):
-            return False
-        before = i
-    dx: cython.double = edges[edge, 2] - edges[edge, 0]
-    dy: cython.double = edges[edge, 3] - edges[edge, 1]
-    return not (lies_beyond(dy, -dx, corners, first, end, along, across, edges, edge)
-                or lies_beyond(-dy, dx, corners, first, end, along, across, edges, edge)
-                or lies_beyond(across, -along, corners, first, end, along, across, edges, edge)
-                or lies_beyond(-across, along, corners, first, end, along, across, edges, edge))
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def lies_beyond(normal_x: cython.double, normal_y: cython.double, corners: cython.double[:, ::1], first: cython.int,
-                end: cython.int, along: cython.double, across: cython.double, edges: cython.double[:, ::1], edge: cython.int
-                ) -> cython.bint:
-    """Return whether an edge lies farther in a direction than a convex polygon that moves straight ever gets."""
-    farthest: cython.double = -UNLIMITED
-    i: cython.int
-    for i in range(first, end):
-        farthest = max(farthest, normal_x * corners[i, 0] + normal_y * corners[i, 1])
-    farthest += max(0.0, normal_x * along + normal_y * across)
-    return min(normal_x * edges[edge, 0] + normal_y * edges[edge, 1],
-               normal_x * edges[edge, 2] + normal_y * edges[edge, 3]) > farthest
-
-
-@cython.cfunc
-@cython.nogil
-@cython.exceptval(check=False)
-def squared_to_segment(x: cython.double, y: cython.double, edges: cython.double[:, ::1], edge: cython.int) -> cython.double:
-    """Return the squared distance from a point to an edge."""
-    dx: cython.double = edges[edge, 2] - edges[edge, 0]
-    dy: cython.double = edges[edge, 3] - edges[edge, 1]
-    px: cython.double = x - edges[edge, 0]
-    py: cython.double = y - edges[edge, 1]
-    along: cython.double = (px * dx + py * dy) / (dx * dx + dy * dy)
-    along = min(max(along, 0.0), 1.0)
-    px -= along * dx
-    py -= along * dy
-    return px * px + py * py
+                left, right = min(left, column), max(right, column)
+                low, high = min(low, row), row
+        if high < 0:
+            return True
+        # Half a cell more, for rounding.
+        return not self.edges.meets_sweep((left - 0.5) * self.resolution, (low - 0.5) * self.resolution,
+                                          (right + 1.5) * self.resolution, (high + 1.5) * self.resolution,
+                                          corners, first, end, along, across)
 
 
 @cython.cfunc

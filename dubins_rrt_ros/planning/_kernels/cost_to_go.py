@@ -56,7 +56,12 @@ def may_be_free(clearance: Clearance, row: cython.int, column: cython.int, requi
     bound: cython.double = cython.cast(cython.double, clearance.field[row, column])
     if bound < 0 or bound >= required_clearance:
         return bound >= 0
-    enough: cython.double = required_clearance - side * (sqrt(0.125) + ROUNDING)
+    if bound + side * sqrt(8.0) < required_clearance:  # `bound` is at most two diagonals below the clearance
+        return False
+    farther: cython.double = side * (sqrt(0.125) + ROUNDING)
+    enough: cython.double = required_clearance - farther
+    if clearance.exact((column + 0.5) * side, (row + 0.5) * side) + farther < enough:  # so has none of the quarters' centres
+        return False
     quarter: cython.int
     for quarter in range(4):
         if clearance.exact((column + 0.25 + 0.5 * (quarter & 1)) * side, (row + 0.25 + 0.5 * (quarter >> 1)) * side) >= enough:

@@ -12,12 +12,15 @@ from scipy import ndimage
 from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.distance import fill_columns, measure_row_gaps
+from .._kernels.edge_raster import rasterise_edges
 from ..maps.model import GridMap, PolygonMap
 
 #: A sample of a curve is free with this much more than the required clearance [m]; it bounds the shortest step along the curve.
 CLEARANCE_MARGIN = 0.0005
-#: Number of raster cells over a polygon map, about.
-POLYGON_CELLS = 15_000
+#: Approximate number of the raster's cells over polygons of few and of many edges, and number of edges from which they are many.
+FEW_CELLS, MANY_CELLS, MANY_EDGES = (1_000_000, 2_300_000, 3_000) if COMPILED else (35_000, 35_000, 3_000)
+#: Approximate maximum number of times that an edge touches a cell.
+MAX_TOUCHED = 50_000_000 if COMPILED else 500_000
 #: Number of columns at a time that are searched for cells that a change reaches.
 STRIP = 64
 
@@ -31,14 +34,20 @@ def grid_clearance(grid: GridMap, allow_unknown: bool, previous: GridClearance |
         previous: the distances of another grid; if that has the same shape and resolution, only what differs is computed.
     """
     free, cell = ~grid.blocked(allow_unknown), grid.resolution
-    if not COMPILED:
-        row_gap, bounds = _by_scipy(free, cell)
-    elif previous is not None and (previous.field.shape, previous.resolution) == (free.shape, cell):
+    if COMPILED and previous is not None and (previous.field.shape, previous.resolution) == (free.shape, cell):
         row_gap, bounds = _changed(previous, free)
     else:
-        row_gap, bounds = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
-        _fill(row_gap, bounds, free, cell, *(slice(0, n) for n in free.shape))
+        row_gap, bounds = _distances(free, cell)
     return GridClearance(field=bounds, resolution=cell, origin=grid.origin, margin=CLEARANCE_MARGIN, row_gap=row_gap)
+
+
+def _distances(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the row gaps and the bounds."""
+    if not COMPILED:
+        return _by_scipy(free, cell)
+    row_gap, bounds = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
+    _fill(row_gap, bounds, free, cell, *(slice(0, n) for n in free.shape))
+    return row_gap, bounds
 
 
 def _fill(row_gap: np.ndarray, bounds: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
@@ -105,25 +114,22 @@ def _by_scipy(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def polygon_clearance(polygons: PolygonMap) -> PolygonClearance:
-    """Return the distances to the edges of polygons; a raster tells which edges can be nearest to a point of each cell."""
-    x0, y0, x1, y1 = shapely.bounds(polygons.free)
-    cell = math.sqrt((x1 - x0) * (y1 - y0) / POLYGON_CELLS)
+    """Return the distances to the edges of polygons; as for a grid, with the cells that an edge touches as obstacles."""
+    x0, y0, x1, y1 = shapely.bounds(polygons.free).tolist()
+    edges = _edges(polygons.free) - np.array([x0, y0, x0, y0])
+    cell = _cell_side(x1 - x0, y1 - y0, edges)
     columns, rows = (max(1, math.ceil(side / cell)) for side in (x1 - x0, y1 - y0))
-    centre_x, centre_y = np.meshgrid(x0 + (np.arange(columns) + 0.5) * cell, y0 + (np.arange(rows) + 0.5) * cell)
-    centres = shapely.points(centre_x.ravel(), centre_y.ravel())
-    edges = _edges(polygons.free)
-    tree = shapely.STRtree(shapely.linestrings(edges.reshape(-1, 2, 2)))
-    _, distance = tree.query_nearest(centres, all_matches=False, return_distance=True)
-    half_diagonal = cell / math.sqrt(2)
-    # Only an edge that is at most a diagonal farther from the centre than the nearest can be nearest to a point of the cell.
-    of_cell, edge = tree.query(centres, predicate="dwithin", distance=distance + 2 * half_diagonal * (1 + 1e-9))
-    order = np.argsort(of_cell, kind="stable")
-    first = np.searchsorted(of_cell[order], np.arange(rows * columns + 1))
-    bounds = _rounded_down(distance - half_diagonal)
-    bounds[~shapely.contains_xy(polygons.free, centre_x.ravel(), centre_y.ravel()) & (distance > half_diagonal)] = -1
-    return PolygonClearance(field=bounds.reshape(rows, columns), resolution=cell, origin=(x0, y0, 0.0), margin=CLEARANCE_MARGIN,
-                            edges=edges - np.array([x0, y0, x0, y0]), first_edge=first.astype(np.int64),
-                            edge_of=edge[order].astype(np.int32))
+    touched, inside = rasterise_edges(edges, cell, rows, columns)
+    _, bounds = _distances(inside.view(bool), cell)
+    bounds[touched.view(bool)] = 0
+    return PolygonClearance(field=bounds, resolution=cell, origin=(x0, y0, 0.0), margin=CLEARANCE_MARGIN, edges=edges)
+
+
+def _cell_side(width: float, height: float, edges: np.ndarray) -> float:
+    """Return the side of the raster's cells over polygons [m]; in proportion to their size, so that scale makes no difference."""
+    cells = FEW_CELLS if len(edges) < MANY_EDGES else MANY_CELLS
+    crossed = float(np.abs(edges[:, :2] - edges[:, 2:]).sum())
+    return max(math.sqrt(width / cells * height), max(width, height) / cells, crossed / MAX_TOUCHED)
 
 
 def _edges(polygons: shapely.Geometry) -> np.ndarray:

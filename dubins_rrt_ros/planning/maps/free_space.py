@@ -11,6 +11,10 @@ from .errors import MapError
 
 #: Largest coordinate of a map [m]; beyond it a double cannot tell tenths of a micrometre.
 MAX_COORDINATE = 1e9
+#: Maximum number of vertices of polygons; more would take many seconds to check and to plan on.
+MAX_VERTICES = 500_000
+#: Minimum width and height of a map [m]: the planner keeps half a millimetre from obstacles on either side.
+MIN_SIDE = 0.001
 #: Maximum number of pairs of edges of different polygons that may cross, beyond one for each edge: a crossing takes 10 us and a
 #: kilobyte.
 MAX_CROSSINGS = 100_000
@@ -71,11 +75,23 @@ def valid(geometry: shapely.Geometry, label: str) -> shapely.Geometry:
     """Return a geometry that is valid.
 
     Raises:
-        MapError: it is not.
+        MapError: it is not, or has too many vertices to tell soon.
     """
+    check_size(geometry, label)
     if not shapely.is_valid(geometry):
         raise MapError(f"{label} is not valid ({shapely.is_valid_reason(geometry)}); mend its rings")
     return geometry
+
+
+def check_size(geometry: shapely.Geometry, label: str) -> None:
+    """Refuse polygons that cannot be checked or used in time, before that is tried.
+
+    Raises:
+        MapError: there are too many vertices.
+    """
+    count = int(shapely.get_num_coordinates(geometry))
+    if count > MAX_VERTICES:
+        raise MapError(f"{label} has {count} vertices; simplify the polygons to {MAX_VERTICES} in all")
 
 
 def _corners(shape: Any, label: str) -> np.ndarray:

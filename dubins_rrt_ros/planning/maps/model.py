@@ -13,7 +13,7 @@ import shapely
 from ..text import quoted
 from .errors import MapError, MapMetadataError
 from .frame import LARGEST_YAW, Frame
-from .free_space import Shape, free_space, polygon_of, polygons_of
+from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, polygons_of
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
@@ -176,11 +176,16 @@ class PolygonMap:
         if shapely.get_type_id(self.free) not in (3, 6) or shapely.is_empty(self.free):
             raise MapError(f"{self.name}: the free space is a {self.free.geom_type} without area; "
                            "give a Polygon or MultiPolygon")
+        check_size(self.free, f"{self.name}: the free space")
         if not shapely.is_valid(self.free):
             raise MapError(f"{self.name}: the free space is no valid polygon ({shapely.is_valid_reason(self.free)}); "
                            "mend its rings")
         if not np.isfinite(shapely.bounds(self.free)).all():
             raise MapError(f"{self.name}: a coordinate is not finite; give finite metres")
+        x0, y0, x1, y1 = shapely.bounds(self.free).tolist()
+        if min(x1 - x0, y1 - y0) < MIN_SIDE:
+            raise MapError(f"{self.name}: the free space is {x1 - x0:g} m x {y1 - y0:g} m, too thin for any vehicle; give "
+                           f"metres, {MIN_SIDE:g} m at least each way")
         prepare_for_threads(self.free)
 
     @classmethod
