@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import math
 import signal
 import sys
 import threading
@@ -11,6 +12,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan
+from dubins_rrt_ros.planning.problem import LARGEST_YAW
 from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.example import ENDS, EXAMPLE, MAP
@@ -19,6 +21,10 @@ from .common.output import check_drawing, check_folder, words_for, write_csv, wr
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
 from .common.request import MAP_FLAGS, LoadedRequest, add_map_arguments, map_options, read_map, read_replay
+
+#: Where the poses of a car are, for the help.
+REFERENCE_POINT = ("Poses are of the vehicle's reference point; a car's is the middle of its rear axle, for which the turning "
+                   "radius is wheelbase / tan(max_steering_angle). With another point nothing is guaranteed.")
 
 
 class _Replay(argparse.Action):
@@ -43,12 +49,14 @@ def add_arguments(parser: Parser) -> None:
         examples=[EXAMPLE, f"dubins_rrt plan {MAP} {ENDS} --planner rrt --json plan.json", "dubins_rrt plan --replay plan.json",
                   "dubins_rrt plan parking.geojson --start 2.5 8.75 0 --goal 22 4.1 -1.5708 --turning-radius 5 \\",
                   "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'"],
-        notes="The first Ctrl-C ends the search with the best path so far.",
+        notes=f"{REFERENCE_POINT} The first Ctrl-C ends the search with the best path so far.",
         exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, 130 interrupted")
     required = [add_map_arguments(parser)]
     for name, text in (("--start", "start pose of the vehicle"), ("--goal", "goal pose of the vehicle")):
         required.append(parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), required=True,
                                             default=argparse.SUPPRESS, help=f"{text} [m, m, rad]"))
+    parser.add_argument("--degrees", action="store_true", default=argparse.SUPPRESS,
+                        help="take the yaws of --start and --goal in degrees; what is written stays in radians")
     add_json_flag(parser, "the plan, also without a path,")
     parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x,y,theta")
     parser.add_argument("--plot", metavar="FILE", help="draw map, tree and path; .png, .svg or .pdf")
@@ -88,8 +96,20 @@ def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
         print(f"dubins_rrt plan: warning: {flag(name)} has no effect, as {flag(by)} takes its place", file=sys.stderr)
     vehicle, settings = Vehicle(**given), Settings(**given_settings(arguments))
     world_map, load_time = read_map(arguments.map, **map_options(arguments))
-    problem = Problem(world_map, vehicle, arguments.start, arguments.goal, **given_options(arguments, Problem))
+    start, goal = (_pose(arguments, name) for name in ("start", "goal"))
+    problem = Problem(world_map, vehicle, start, goal, **given_options(arguments, Problem))
     return LoadedRequest(arguments.map, problem, settings, load_time)
+
+
+def _pose(arguments: argparse.Namespace, name: str) -> list[float]:
+    """Return a pose as it was given, its yaw in radians; a yaw beyond 2 pi is taken, with a warning."""
+    x, y, yaw = getattr(arguments, name)
+    if "degrees" in arguments:
+        return [x, y, math.radians(yaw)]
+    if 2 * math.pi < abs(yaw) <= LARGEST_YAW:
+        print(f"dubins_rrt plan: warning: the yaw of {flag(name)} is {yaw:g} rad; did you mean {math.radians(yaw):.5g}? "
+              "--degrees takes degrees", file=sys.stderr)
+    return [x, y, yaw]
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """`dubins_rrt plan`, by what it prints, writes and returns."""
 
 import json
+import math
 import os
 import pty
 import signal
@@ -50,6 +51,28 @@ def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
     assert status == 0 and error == "" and out.count("\n") == 1
     for figure in (" m, ", "%", "150 samples", "Lower bound ", "first path after ", "tree nodes", "seed 4"):
         assert figure in out
+
+
+def test_a_yaw_beyond_a_full_turn_is_doubted_and_degrees_can_be_given(hall, capsys):
+    at = ["--start", "-4", "-3", "90", "--goal", "3.5", "-3", "-90"]
+    status, _, error = run(hall, *at, *BUDGET, capsys=capsys)
+    assert status == 0 and error.splitlines() == [
+        f"dubins_rrt plan: warning: the yaw of --{name} is {yaw} rad; did you mean {meant}? --degrees takes degrees"
+        for name, yaw, meant in (("start", "90", "1.5708"), ("goal", "-90", "-1.5708"))]
+    status, out, error = run(hall, *at, "--degrees", *BUDGET, "--json", "-", capsys=capsys)
+    assert status == 0 and "warning" not in error
+    assert [json.loads(out)[name][2] for name in ("start", "goal")] == [math.pi / 2, -math.pi / 2]
+    assert run(hall, *REQUEST, *BUDGET, capsys=capsys)[2] == ""
+
+
+def test_the_reference_point_of_a_car_is_told_in_help_readme_and_docs(capsys):
+    with pytest.raises(SystemExit):
+        main(["plan", "--help"])
+    root = Path(__file__).parents[2]
+    for text in (capsys.readouterr().out, (root / "README.md").read_text(), (root / "docs/dubins_curves.md").read_text()):
+        assert "rear axle" in " ".join(text.split())
+        assert any(formula in " ".join(text.split()) for formula in ("wheelbase / tan(max_steering_angle)", "L / tan φ",
+                                                                     "`wheelbase` / tan(`max_steering_angle`)"))
 
 
 def test_how_a_path_was_found_is_told(hall, capsys):
