@@ -209,12 +209,13 @@ def status_message(node: str, status: Status, message: str, *, request: str = ""
 
 def _figures(plan: Plan | None) -> dict[str, object]:
     names = ("found_by", "planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "time_to_first",
-             "planning_time", "min_clearance", "max_curvature", "audit", "seed")
+             "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit", "seed")
     if plan is None:
         return dict.fromkeys(names)
     return dict(zip(names, (
         plan.found_by, plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.lower_bound, plan.gap,
-        plan.time_to_first, plan.planning_time, plan.min_clearance, plan.max_curvature, plan.audit, plan.settings.seed,
+        plan.time_to_first, plan.time_to_found, plan.planning_time, plan.min_clearance, plan.max_curvature, plan.audit,
+        plan.settings.seed,
     ), strict=True))
 
 

@@ -2,9 +2,8 @@
 
 import math
 import secrets
-import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -15,9 +14,11 @@ from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .curves.angles import heading_error, position_error
 from .curves.path import Path
+from .deadline import Deadline, OutOfTime, never
 from .diagnosis import explain
 from .problem import Problem
 from .result import Plan, Progress, Status, gap_above, reaches_goal
+from .search.cost import path_cost
 from .search.cost_to_go import CostToGo
 from .search.headings import FOLLOW_COST_TO_GO
 from .search.lower_bound import lower_bound
@@ -34,6 +35,12 @@ SAME = 1e-9
 LEAST_IMPROVEMENT = 1e-6
 #: What may find a path, by the values of `Plan.found_by`.
 ALGORITHMS = {"hybrid_astar": "hybrid A*", "rrt": "RRT", "rrt_star": "RRT*"}
+#: Minimum time between two audits of improvements, in times that the last one took: the search has the rest.
+AUDIT_INTERVAL = 5
+#: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
+AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
+#: Share of the time, and maximum time [s], that is kept to tell why there is no path.
+REASONS_SHARE, MOST_FOR_REASONS = 0.05, 0.05
 #: A block of memory that is larger than any array of most requests [bytes].
 LARGE_BLOCK = 1 << 24
 
@@ -53,8 +60,8 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
          on_progress: Callable[[Progress], None] | None = None) -> Plan:
     """Plan a path from start to goal.
 
-    The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short. A path that
-    the search has found is shortened in a few milliseconds more, when it is cut short too.
+    The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short. The answer
+    is then the best path so far that passed its audit.
 
     Args:
         problem: what to plan; where it has no world, its map is prepared first.
@@ -65,7 +72,7 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
     Returns:
         A Plan with an audited path, or with a status and a message that say why there is none.
     """
-    return _Call(problem, _with_seed(settings or Settings()), cancel or _never, on_progress or _ignore).answer()
+    return _Call(problem, _with_seed(settings or Settings()), cancel or never, on_progress or _ignore).answer()
 
 
 def _with_seed(settings: Settings) -> Settings:
@@ -75,48 +82,58 @@ def _with_seed(settings: Settings) -> Settings:
     return replace(settings, seed=secrets.randbits(31))
 
 
-def _never() -> bool:
-    return False
-
-
 def _ignore(progress: Progress) -> None:
     pass
+
+
+@dataclass(frozen=True, eq=False)
+class _Audited:
+    """A path that passed its audit, with the search as it was then."""
+
+    path: Path
+    audit: Audit
+    tree: Tree
+    samples: int
+    found_by: str = ""
 
 
 class _Call:
     """One call of plan(), with its clock."""
 
     def __init__(self, problem: Problem, settings: Settings, cancel: Callable[[], bool], on_progress: Callable[[Progress], None]):
-        self._problem, self._settings, self._cancel, self._on_progress = problem, settings, cancel, on_progress
+        self._problem, self._settings, self._on_progress = problem, settings, on_progress
+        self._deadline = Deadline(settings.planning_time, cancel)
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
         self._bound = lower_bound(problem)
         self._obstacles: Obstacles | None = None  # until the world is ready
-        self._last_audit: tuple[Path, Audit] | None = None
+        self._best: _Audited | None = None
+        self._audit_took = 0.0
+        self._last_audit, self._last_report = -math.inf, 0.0  # when they ended [s]
         self._time_to_first: float | None = None
+        self._time_to_found: float | None = None
         self._map_time = 0.0
-        self._started = time.perf_counter()
 
     @property
     def _elapsed(self) -> float:
-        return time.perf_counter() - self._started
-
-    @property
-    def _out_of_time(self) -> bool:
-        return self._elapsed >= self._settings.planning_time
+        return self._deadline.elapsed
 
     def answer(self) -> Plan:
         """Prepare the world, look for reasons against a path, and search."""
-        if self._cancel():
+        if self._is_cancelled():
             return self._cancelled(self._root, 0)
         field = self._prepared_world().field
-        if self._cancel():
+        if self._is_cancelled():
             return self._cancelled(self._root, 0)
         if diagnosis := explain.before_search(self._problem, field):
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
         if reaches_goal(self._problem.start, self._problem, rounding=SAME):
-            self._time_to_first = self._elapsed
-            return self._with_path(Path.of_pose(self._problem.start), self._root, 0)
+            self._time_to_found = self._elapsed
+            return self._answer_with(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
+
+    def _is_cancelled(self) -> bool:
+        self._deadline.poll()
+        return self._deadline.cancelled
 
     def _prepared_world(self) -> World:
         """Return the problem's world, or prepare one; the request's own time begins when it is ready."""
@@ -126,25 +143,70 @@ class _Call:
         if not isinstance(world, World):
             world = prepare(problem.map, problem.vehicle, problem.allow_unknown)
         self._obstacles = world.obstacles
-        self._map_time, self._started = self._elapsed, time.perf_counter()
+        self._map_time = self._elapsed
+        self._deadline.restart()
         return world
 
     def _search(self, field: ClearanceField) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
-        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field))
-        best, reported = math.inf, 0.0
-        cancelled = False
-        for may_end in () if self._out_of_time else search.run():
-            cancelled = cancelled or self._cancel()
-            if search.best >= 0 and self._time_to_first is None:
-                self._time_to_first = self._elapsed
-            improved = search.cost < best - LEAST_IMPROVEMENT
-            if improved or self._elapsed - reported >= REPORT_INTERVAL:
-                best, reported = search.cost, self._elapsed
-                self._on_progress(Progress(search.samples, reported, search.length, improved, lambda: self._snapshot(search)))
-            if may_end and (cancelled or self._out_of_time):
+        deadline = self._deadline
+        deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
+        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline)
+        for may_end in () if deadline.is_due else search.run():
+            if search.best >= 0 and self._time_to_found is None:
+                self._time_to_found = self._elapsed
+                deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
+            self._report(search)
+            deadline.poll()
+            if deadline.is_over or (may_end and deadline.is_due):
                 break
-        return self._end_of(search, field, cancelled)
+        return self._end_of(search, field)
+
+    def _report(self, search: Search) -> None:
+        """Report a better path, once it is shortened and audited, and the state of the search from time to time."""
+        improved = search.ready and self._is_audit_due(search.cost) and self._is_right(search.path, search)
+        if improved or self._elapsed - self._last_report >= REPORT_INTERVAL:
+            self._tell(search.samples, improved, lambda: self._snapshot(search))
+
+    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan]) -> None:
+        self._last_report = self._elapsed
+        length = self._best.path.length if self._best else None
+        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot))
+
+    def _is_audit_due(self, cost: float) -> bool:
+        """Return True if a path of this cost is better than the best that was audited, and the last audit is long enough ago."""
+        if self._best is None:
+            return True
+        return (cost < path_cost(self._best.path) - LEAST_IMPROVEMENT
+                and self._elapsed - self._last_audit >= AUDIT_INTERVAL * self._audit_took)
+
+    def _is_right(self, path: Path | None, search: Search) -> bool:
+        """Audit the best path of a search, and keep it where it is right; False too where the time does not suffice."""
+        if path is None:
+            return False
+        try:
+            audit = self._audit(path)
+        except OutOfTime:
+            return False
+        if audit.ok:
+            self._keep(_Audited(path, audit, search.tree, search.samples, search.found_by))
+        return audit.ok
+
+    def _audit(self, path: Path) -> Audit:
+        """Audit a path once: an improvement that was reported is often the answer too."""
+        if self._best and self._best.path == path:
+            return self._best.audit
+        began = self._elapsed
+        audit = audit_path(path, self._problem, self._obstacles, self._deadline.check)
+        self._last_audit = self._elapsed
+        self._audit_took = self._last_audit - began
+        self._deadline.reserve = AUDIT_RESERVE * self._audit_took
+        return audit
+
+    def _keep(self, audited: _Audited) -> None:
+        self._best = audited
+        if self._time_to_first is None:
+            self._time_to_first = self._elapsed
 
     def _cost_to_go_if_needed(self, field: ClearanceField) -> CostToGo | None:
         needed = self._settings.informed or self._settings.heading_sampling in FOLLOW_COST_TO_GO
@@ -152,19 +214,44 @@ class _Call:
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
-        path = search.path
-        if path is not None:
-            return self._with_path(path, search.tree, search.samples, search.found_by, running=True)
+        if self._best:
+            return self._with_path(self._best, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
         return self._plan(Status.TIMEOUT, message, search.tree, samples=search.samples)
 
-    def _end_of(self, search: Search, field: ClearanceField, cancelled: bool) -> Plan:
+    def _end_of(self, search: Search, field: ClearanceField) -> Plan:
         """Return the plan of a search that has ended."""
-        path = search.path
-        if path is not None:
-            self._bound = lower_bound(self._problem, search.make_bound())
-            return self._with_path(path, search.tree, search.samples, search.found_by, cancelled=cancelled and not search.done)
-        return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
+        path, cancelled = search.path, self._deadline.cancelled
+        if path is None:
+            return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
+        before = self._best
+        answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
+        if self._best and (before is None or path_cost(self._best.path) < path_cost(before.path) - LEAST_IMPROVEMENT):
+            self._tell(answer.samples, True, lambda: answer)
+        return answer
+
+    def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
+        """Return the plan with the best path; without it where it fails its audit, with the one before where the time is up."""
+        try:
+            audit = self._audit(path)
+        except OutOfTime:
+            return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples, cancelled)
+        if not audit.ok:
+            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
+            return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audit)
+        self._keep(_Audited(path, audit, tree, samples, search.found_by if search else ""))
+        if search:
+            self._bound = lower_bound(self._problem, search.make_bound(self._time_for_bound()))
+        return self._with_path(self._best, cancelled)
+
+    def _time_for_bound(self) -> float:
+        """Return how long the lower bound is waited for [s]: an answer of RRT, which ends with its first path, does not wait."""
+        return 0.0 if self._settings.planner == "rrt" or self._deadline.cancelled else max(0.0, self._deadline.left)
+
+    def _not_audited(self, path: Path, tree: Tree, samples: int, cancelled: bool) -> Plan:
+        """Return the plan without a path where one was found, but too late for its audit."""
+        message = f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
+        return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, message, tree, samples=samples, cancelled=cancelled)
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
         message = f"Cancelled before a first path: {self._drawn(samples, len(tree))}."
@@ -178,7 +265,10 @@ class _Call:
             what, more = "No path found", "samples"
         else:
             what, more = f"No path within planning_time {self._settings.planning_time:g} s", "time"
-        why, location = explain.after_search(self._problem, field, tree, more)
+        try:
+            why, location = explain.after_search(self._problem, field, tree, more, self._deadline.check)
+        except OutOfTime:
+            why, location = f"allow more {more}", None
         if search.samples == 0 and location is None:
             why = f"allow more {more}"
         elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
@@ -190,24 +280,14 @@ class _Call:
         of_budget = f" of {self._settings.samples}" if samples <= self._settings.samples else ""
         return f"{samples}{of_budget} samples drawn, {tree}, {self._elapsed:.3g} s"
 
-    def _with_path(self, path: Path, tree: Tree, samples: int, found_by: str = "", *, cancelled: bool = False,
-                   running: bool = False) -> Plan:
-        """Return the plan with a path, if the path passes the audit."""
-        audit = self._audit(path)
-        if not audit.ok:
-            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audit)
+    def _with_path(self, best: _Audited, cancelled: bool = False, running: bool = False) -> Plan:
+        """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
-        bound, elapsed = min(self._bound, path.length), self._elapsed
-        message = self._success_message(path, found_by, bound, samples, elapsed, cancelled, running)
-        return self._plan(Status.NONE, message, tree, path=path, samples=samples, cancelled=cancelled, audit=audit,
-                          found_by=found_by, lower_bound=bound, planning_time=elapsed)
+        bound, elapsed = min(self._bound, best.path.length), self._elapsed
+        message = self._success_message(best.path, best.found_by, bound, best.samples, elapsed, cancelled, running)
+        return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
+                          audit=best.audit, found_by=best.found_by, lower_bound=bound, planning_time=elapsed)
 
-    def _audit(self, path: Path) -> Audit:
-        """Audit a path once: an improvement that was reported is often the answer too."""
-        if self._last_audit is None or self._last_audit[0] != path:
-            self._last_audit = path, audit_path(path, self._problem, self._obstacles)
-        return self._last_audit[1]
 
     def _success_message(self, path: Path, found_by: str, bound: float, samples: int, elapsed: float, cancelled: bool,
                          running: bool) -> str:
@@ -216,7 +296,7 @@ class _Call:
         gap = gap_above(bound, path.length)
         above = f", at most {100 * gap:.1f} % above the shortest possible" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
-        drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample"
+        drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else f"{'cancelled ' if cancelled else ''}before the first sample"
         found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
         message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
         if self._problem.exact_goal:
@@ -229,4 +309,4 @@ class _Call:
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
         figures = {"lower_bound": self._bound, "planning_time": self._elapsed} | more
         return Plan(status, message, self._problem, self._settings, tree, time_to_first=self._time_to_first,
-                    map_time=self._map_time, **figures)
+                    time_to_found=self._time_to_found, map_time=self._map_time, **figures)

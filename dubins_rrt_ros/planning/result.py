@@ -58,7 +58,8 @@ class Plan:
         samples: number of samples drawn.
         location: (x, y) of what shows why there is no path [m]: the nearest obstacle, narrowest place or first hit; or None.
         cancelled: True if it was cancelled; a path is then the best so far.
-        time_to_first: time until the search found its first path, its audit not counted [s], or None.
+        time_to_first: time until the first path was shortened, audited and ready [s], or None.
+        time_to_found: time until the search had found a path, which was neither shortened nor audited yet [s], or None.
         planning_time: time from request to answer, the preparation of the map not counted [s].
         map_time: time for the preparation of the map, and for loading it where the caller added that [s].
         lower_bound: no path of the problem is shorter [m].
@@ -77,6 +78,7 @@ class Plan:
     location: Point | None = None
     cancelled: bool = False
     time_to_first: float | None = None
+    time_to_found: float | None = None
     planning_time: float = 0.0
     map_time: float = 0.0
     lower_bound: float = 0.0
@@ -176,6 +178,8 @@ class Plan:
             yield f"the path is {path.length} m long, less than the lower bound {self.lower_bound} m"
         if self.time_to_first is None or not 0 <= self.time_to_first <= self.planning_time:
             yield f"the first path came after {self.time_to_first} s of {self.planning_time} s"
+        elif self.time_to_found is None or not 0 <= self.time_to_found <= self.time_to_first:
+            yield f"the first path was found after {self.time_to_found} s, and ready after {self.time_to_first} s"
         if not self._is_in_tree(path):
             yield f"the path of {path.length} m to {path.end} is not in the tree of {len(self.tree)} nodes"
 
@@ -218,10 +222,9 @@ class Progress:
     Attributes:
         samples: number of samples drawn so far.
         elapsed: time since the request [s].
-        length: length of the best path so far [m], or None.
-        improved: True if this report was made because the best path is new.
-        snapshot: a function that returns the audited Plan so far; it costs an audit, so call it only to use it, and
-            only before the callback returns.
+        length: length of the best path so far that is shortened and audited [m], or None.
+        improved: True if this report was made because that path is new.
+        snapshot: a function that returns the Plan so far, with that path; call it only before the callback returns.
     """
 
     samples: int

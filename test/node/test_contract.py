@@ -41,7 +41,7 @@ SERVICES = [
 ]
 KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
         "path_length",
-        "lower_bound", "gap", "time_to_first", "planning_time", "min_clearance", "max_curvature", "audit", "seed",
+        "lower_bound", "gap", "time_to_first", "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit", "seed",
         "map_id", "stamp"]
 
 OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)

@@ -218,7 +218,7 @@ def test_a_vehicle_with_a_wheelbase(planner):
 def test_a_path_that_fails_the_audit_is_a_defect_and_not_a_path(planner, monkeypatch):
     from dubins_rrt_ros.planning import planner as module
 
-    def strict(path, problem, obstacles):
+    def strict(path, problem, obstacles, check_time=None):
         return audit_path(path, Problem(problem.map, Vehicle(0.5, 5.0), problem.start, problem.goal))
 
     monkeypatch.setattr(module, "audit_path", strict)

@@ -191,7 +191,7 @@ def test_a_plan_that_ran_out_of_time_is_had_again_by_its_file(problems, monkeypa
     for limit in (0.05, 0.2, 1.0, 3.0):
         with monkeypatch.context() as patched:
             now = iter(np.arange(1e6) / 100)
-            patched.setattr("dubins_rrt_ros.planning.planner.time.perf_counter", lambda now=now: next(now))
+            patched.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda now=now: next(now))
             result = plan(problems["maze"], Settings(seed=3, samples=1_000_000, planning_time=limit))
         if result.path is None:
             assert result.status == Status.TIMEOUT

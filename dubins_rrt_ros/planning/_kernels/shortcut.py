@@ -79,19 +79,22 @@ class Shortcutter:
         self.new_words = np.empty(MAX_NEW, np.int8)
         self.measure_from(1)
 
-    def improve(self, draws: cython.double[:, ::1], shortcuts: cython.double):
-        """Try a change for each row of (n, 6) draws, four uniform in [0, 1) and two normal.
+    def improve(self, draws: cython.double[:, ::1], begin: cython.int, end: cython.int, shortcuts: cython.double):
+        """Try a change for each of the rows from `begin` to `end` of (n, 6) draws, four uniform in [0, 1) and two normal.
 
-        `shortcuts` is the share of shortcuts among the changes.
+        It comes to the same, whether all rows are tried at once or some after the other. `shortcuts` is the share of shortcuts
+        among the changes.
         """
         i: cython.int
         with cython.nogil:
-            self.clear()
-            for i in range(draws.shape[0]):
+            if begin == 0:
+                self.clear()
+            for i in range(begin, end):
                 self.try_change(draws[i, 0] < shortcuts, draws[i, 1], draws[i, 2], draws[i, 3], draws[i, 4], draws[i, 5])
                 if (i + 1) % TRIES_PER_CLEARING == 0:
                     self.clear()
-            self.clear()
+            if end == draws.shape[0]:
+                self.clear()
 
     def try_change(self, direct, where, back, ahead, across, turn):
         """Try a shortcut or a perturbation; the draws say where, how far back and ahead, and by how much off the path."""

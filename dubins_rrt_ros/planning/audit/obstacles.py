@@ -4,6 +4,7 @@ For a grid they are the squares of its blocked cells and what is outside of it, 
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import shapely
@@ -18,6 +19,8 @@ MARGIN, TILE = 64, 8
 ROWS_AT_ONCE = 1_000_000
 #: Side of the squares in which cells along the path of a polygon are read [cells].
 BLOCK = 32
+#: Number of runs of blocks that are read at once.
+RUNS_AT_ONCE = 64
 
 
 class PolygonObstacles:
@@ -29,12 +32,12 @@ class PolygonObstacles:
         edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
         self._tree = shapely.STRtree(shapely.linestrings(edges))
 
-    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the distances of points from the obstacles [m]; 0 in one."""
+    def distance(self, x: np.ndarray, y: np.ndarray, reach: float = math.inf) -> np.ndarray:
+        """Return the distances of points from the obstacles [m]; 0 in one, and never more than `reach` [m]."""
         inside = shapely.contains_xy(self._free, x, y)
         out = np.zeros(len(x))
         out[inside] = _to_nearest(self._tree, shapely.points(x[inside], y[inside]))
-        return out
+        return np.minimum(out, reach)
 
     def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
         """Return the distances of polygons, or of their convex hulls, from the obstacles [m]; 0 where they meet.
@@ -58,18 +61,20 @@ class GridObstacles:
         self._thresholds, self._allow_unknown = grid.thresholds, allow_unknown
         self._windows: dict[tuple[int, complex], _Window] = {}
 
-    def distance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the distances of points from the obstacles [m]; 0 in one."""
+    def distance(self, x: np.ndarray, y: np.ndarray, reach: float = math.inf) -> np.ndarray:
+        """Return the distances of points from the obstacles [m]; 0 in one, `reach` [m] where there is none within reach."""
         x0, y0, yaw = self._origin
         rows, columns = self._data.shape
         place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
         to_edge = np.min([place.real, columns - place.real, place.imag, rows - place.imag], axis=0)
-        out = np.where(to_edge > 0, to_edge, 0.0)
-        reach, undecided = FIRST_REACH, np.flatnonzero(out)
+        out = np.minimum(np.where(to_edge > 0, to_edge, 0.0), reach / self._resolution)
+        cells, undecided = FIRST_REACH, np.flatnonzero(out)
         while len(undecided):
-            out[undecided] = np.minimum(out[undecided], self._within(reach, place[undecided]))
-            undecided = undecided[out[undecided] >= reach]
-            reach *= 4
+            out[undecided] = np.minimum(out[undecided], self._within(cells, place[undecided]))
+            undecided = undecided[out[undecided] >= cells]
+            if cells >= reach / self._resolution:
+                break
+            cells *= 4
         distances: np.ndarray = out * self._resolution
         return distances
 
@@ -137,17 +142,21 @@ class PathsideSquares:
         points: of the path, x + iy [m].
         margin: maximum distance of a shape's points from the nearest of those points [m].
         reach: maximum distance from a shape at which obstacles matter [m]; cells beyond margin and reach are not read.
+        check_time: called every few milliseconds; what it raises ends the reading of cells.
     """
 
-    def __init__(self, grid: GridMap, allow_unknown: bool, points: np.ndarray, margin: float, reach: float):
+    def __init__(self, grid: GridMap, allow_unknown: bool, points: np.ndarray, margin: float, reach: float,
+                 check_time: Callable[[], None] | None = None):
         self._grid = grid
         near = self._blocks_near(points, (margin + reach) / grid.resolution)
         #: Distances are exact up to here, and never more [m].
         self.reach = math.inf if near.all() else reach
+        runs = BLOCK * _runs(near)
         rectangles = [np.empty((0, 4), int)]
-        for row, first, end in (BLOCK * _runs(near)).tolist():
-            part = grid.thresholds.blocked(grid.data[row:row + BLOCK, first:end], allow_unknown)
-            rectangles.append(_rectangles(part) + np.array([first, row, first, row]))
+        for begin in range(0, len(runs), RUNS_AT_ONCE):
+            if check_time:
+                check_time()
+            rectangles.append(self._rectangles_in(runs[begin:begin + RUNS_AT_ONCE], allow_unknown))
         self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
 
     def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
@@ -165,6 +174,20 @@ class PathsideSquares:
         if len(self._tree):
             out[inside] = np.minimum(out[inside], _to_nearest(self._tree, _shapes(place[inside], hull)))
         return np.minimum(out * self._grid.resolution, self.reach)
+
+    def _rectangles_in(self, runs: np.ndarray, allow_unknown: bool) -> np.ndarray:
+        """Return rectangles as `_rectangles` does, of the cells in runs of blocks, which are laid side by side for it."""
+        data = self._grid.data
+        width = runs[:, 2] - runs[:, 1] + 1  # with a free column that keeps it apart from the next
+        begin = np.cumsum(width) - width
+        cells = np.zeros((BLOCK, int(width.sum())), bool)
+        for (row, first, end), at in zip(runs.tolist(), begin.tolist(), strict=True):
+            part = self._grid.thresholds.blocked(data[row:row + BLOCK, first:end], allow_unknown)
+            cells[:part.shape[0], at:at + part.shape[1]] = part
+        rectangles = _rectangles(cells)
+        run = np.searchsorted(begin, rectangles[:, 0], side="right") - 1
+        across, along = runs[run, 0], runs[run, 1] - begin[run]
+        return np.asarray(rectangles + np.column_stack([along, across, along, across]))
 
     def _place(self, points: np.ndarray) -> np.ndarray:
         """Return points in the grid's own frame, in cells."""

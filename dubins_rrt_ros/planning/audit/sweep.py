@@ -13,6 +13,7 @@ Pieces are halved until the bounds decide.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,8 @@ MOST_PIECES = 500_000
 FIRST_PIECES = 64
 #: Number of cells around a polygon within which obstacles are sought at first.
 FIRST_CELLS = 24
+#: Distance within which obstacles are sought at first around a disc, in required clearances and at least [m].
+FIRST_REACH, LEAST_REACH = 3, 0.5
 #: Approximate maximum number of points along a path around which cells are read.
 MOST_POINTS = 10_000
 
@@ -66,17 +69,22 @@ class Arcs:
         return index, nth * size, size
 
 
-def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacles: Obstacles | None = None
-                       ) -> tuple[list[str], float]:
+def any_time() -> None:
+    """Let an audit go on, however long it takes."""
+
+
+def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacles: Obstacles | None = None,
+                       check_time: Callable[[], None] = any_time) -> tuple[list[str], float]:
     """Return what is wrong with the clearance along arcs, a sentence each, and the least clearance [m].
 
     Args:
         slack: maximum distance of the vehicle from where the arcs put it [m].
         obstacles: those of the problem's map, where they are known already.
+        check_time: called every few milliseconds; what it raises ends the audit.
     """
     vehicle = problem.vehicle
     required_clearance = slack + (TOUCH if vehicle.footprint else max(vehicle.robot_radius, POINT))
-    least, (x, y), decided = _least_clearance(arcs, problem, required_clearance, obstacles)
+    least, (x, y), decided = _least_clearance(arcs, problem, required_clearance, obstacles, check_time)
     findings = []
     if not decided:
         findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {required_clearance:g} m "
@@ -97,35 +105,50 @@ def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
 _Least = tuple[float, tuple[float, float], bool]
 
 
-def _least_clearance(arcs: Arcs, problem: Problem, required_clearance: float, obstacles: Obstacles | None) -> _Least:
+def _least_clearance(arcs: Arcs, problem: Problem, required_clearance: float, obstacles: Obstacles | None,
+                     check_time: Callable[[], None]) -> _Least:
     """Return the least clearance, where it is, and whether no piece can hide contact."""
     world_map, unknown, footprint = problem.map, problem.allow_unknown, problem.vehicle.footprint
     if not footprint:
-        return _bisect(arcs, DiscSweep(obstacles or obstacles_of(world_map, unknown)), required_clearance)
+        return _least_of_disc(arcs, obstacles or obstacles_of(world_map, unknown), required_clearance, check_time)
     if not isinstance(world_map, GridMap):
         polygons = obstacles if isinstance(obstacles, PolygonObstacles) else PolygonObstacles(world_map.free)
-        return _bisect(arcs, PolygonSweep(footprint, polygons), required_clearance)
+        return _bisect(arcs, PolygonSweep(footprint, polygons), required_clearance, check_time)
     reach = FIRST_CELLS * world_map.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)
     x, y, _ = arcs.at(index, begin)
     while True:
-        squares = PathsideSquares(world_map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach)
-        found = _bisect(arcs, PolygonSweep(footprint, squares), required_clearance)
+        squares = PathsideSquares(world_map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach, check_time)
+        found = _bisect(arcs, PolygonSweep(footprint, squares), required_clearance, check_time)
         if found[0] < squares.reach:
             return found
         reach *= 4
 
 
-class DiscSweep:
-    """A vehicle that is a disc, as the point in its middle."""
+def _least_of_disc(arcs: Arcs, obstacles: Obstacles, required_clearance: float, check_time: Callable[[], None]) -> _Least:
+    """Return what `_least_clearance` does, for a disc: obstacles far away are left out, unless there are no others."""
+    reach = max(FIRST_REACH * required_clearance, LEAST_REACH)
+    while True:
+        found = _bisect(arcs, DiscSweep(obstacles, reach), required_clearance, check_time)
+        if found[0] < reach:
+            return found
+        reach *= 8
 
-    def __init__(self, obstacles: Obstacles):
-        self._obstacles = obstacles
+
+class DiscSweep:
+    """A vehicle that is a disc, as the point in its middle.
+
+    Attributes:
+        reach: distances are exact up to here, and never more [m].
+    """
+
+    def __init__(self, obstacles: Obstacles, reach: float = math.inf):
+        self._obstacles, self.reach = obstacles, reach
 
     def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return the clearance at poses [m]."""
-        return self._obstacles.distance(x, y)
+        return self._obstacles.distance(x, y, self.reach)
 
     def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
               at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
@@ -202,7 +225,7 @@ class _LeastFound:
         return found
 
 
-def _bisect(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float) -> _Least:
+def _bisect(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
     """Halve the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
     least = _LeastFound(arcs, vehicle)
     index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
@@ -213,6 +236,7 @@ def _bisect(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: f
     at_end = np.roll(at_begin, -1)
     at_end[last] = at_ends
     while 0 < len(index) <= MOST_PIECES and least.clearance >= required_clearance - CONTACT:
+        check_time()
         bound = vehicle.bound(arcs, index, begin, size, at_begin, at_end)
         is_open = ((bound < required_clearance - 2 * CONTACT)
                    | (bound < least.clearance - max(PRECISION, SHARE * least.clearance)))

@@ -5,7 +5,7 @@ on clearance holds between samples too: `sweep.py` says how.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from ..problem import Pose, Problem
 from .obstacles import Obstacles
-from .sweep import Arcs, clearance_findings
+from .sweep import Arcs, any_time, clearance_findings
 
 if TYPE_CHECKING:
     from ..curves.dubins import DubinsCurve
@@ -49,18 +49,20 @@ class Audit:
         return "; ".join(self.findings) or "ok"
 
 
-def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = None) -> Audit:
+def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = None,
+               check_time: Callable[[], None] = any_time) -> Audit:
     """Judge a path of a problem: its ends, its joints, its turns and its clearance.
 
     Args:
         path: what is to be driven.
         problem: with the map, the vehicle and the ends.
         obstacles: those of the problem's map, where they are at hand, such as a World's.
+        check_time: called every few milliseconds; what it raises ends the audit.
     """
     if broken := (*_broken_ends(path), *broken_curves(path.curves)):
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = driven_arcs(path.curves, path.start)
-    too_near, least = clearance_findings(arcs, problem, obstacles=obstacles)
+    too_near, least = clearance_findings(arcs, problem, obstacles=obstacles, check_time=check_time)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
                 *turn_findings(path.curves, problem), *too_near)
     bends = (abs(arc.curvature) for curve in path.curves for arc in curve.arcs if arc.length > 0)

@@ -1,6 +1,7 @@
 """The reason why there is no path: a sentence for a person, with figures and a remedy, and the point that shows it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,13 +73,15 @@ def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
     return None
 
 
-def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str) -> tuple[str, Point | None]:
+def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str, check_time: Callable[[], None]
+                 ) -> tuple[str, Point | None]:
     """Return what kept a search from finding a path, as the end of a sentence, and the location that shows it.
 
     Args:
         problem, field: what was searched.
         tree: the tree of the search.
         more: what could be allowed: "samples" or "time".
+        check_time: called between the slices of the work; what it raises ends it.
     """
     radius = problem.vehicle.turning_radius
     if math.dist(problem.start[:2], problem.goal[:2]) < radius / 10:

@@ -2,9 +2,10 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from functools import cache
-from typing import ParamSpec, TypeVar
+from typing import Generic, ParamSpec, TypeVar
 
 Result = TypeVar("Result")
 Parameters = ParamSpec("Parameters")
@@ -13,6 +14,27 @@ Parameters = ParamSpec("Parameters")
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class BackgroundJob(Generic[Result]):
+    """A job in the background; called, it waits for the result and returns it, each time.
+
+    Args:
+        compute: computes the result.
+        future: of the job, or None where it is left to who asks for its result.
+    """
+
+    def __init__(self, compute: Callable[[], Result], future: "Future[Result] | None"):
+        self._future = future
+        self._result = cache(lambda: compute() if future is None or future.cancel() else future.result())
+
+    def __call__(self) -> Result:
+        """Wait for the result, or compute it."""
+        return self._result()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for so long; return True if the result is there, or is left to who asks for it."""
+        return self._future is None or self._future.cancelled() or bool(wait_for([self._future], seconds).done)
 
 
 class BackgroundExecutor:
@@ -26,14 +48,16 @@ class BackgroundExecutor:
         self._pool: ThreadPoolExecutor | None = None
 
     def start(self, function: Callable[Parameters, Result], *args: Parameters.args, **kwargs: Parameters.kwargs
-              ) -> Callable[[], Result]:
-        """Start `function(*args, **kwargs)`, and return a function that waits for the result and returns it each time."""
+              ) -> BackgroundJob[Result]:
+        """Start `function(*args, **kwargs)`."""
+        def compute() -> Result:
+            return function(*args, **kwargs)
+
         if cores() == 1:
-            return cache(lambda: function(*args, **kwargs))
+            return BackgroundJob(compute, None)
         if self._pool is None:
             self._pool = ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="dubins_rrt_background")
-        future = self._pool.submit(function, *args, **kwargs)
-        return cache(lambda: function(*args, **kwargs) if future.cancel() else future.result())
+        return BackgroundJob(compute, self._pool.submit(compute))
 
     def forget_threads(self) -> None:
         """Start new threads for the next jobs, as a forked process must: it has none of its parent's."""

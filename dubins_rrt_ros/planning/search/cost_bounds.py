@@ -1,13 +1,12 @@
 """Lower bounds of the costs from the start and to the goal, computed in the background."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from ..collision.clearance import ClearanceField
 from ..problem import Problem
-from .background import BACKGROUND
+from .background import BACKGROUND, BackgroundJob
 from .cost_to_go import CostToGo
 
 #: Minimum relative fall of the best cost for which nodes are pruned again.
@@ -26,7 +25,7 @@ class CostBounds:
         self.to_goal = to_goal
         self.from_start: CostToGo | None = None
         self._problem, self._field = problem, field
-        self._jobs: tuple[Callable[[], None], Callable[[], CostToGo] | None] | None = None
+        self._jobs: tuple[BackgroundJob[None], BackgroundJob[CostToGo] | None] | None = None
         self._pruned_at = math.inf
 
     def start(self, from_start: bool = False) -> None:
@@ -37,6 +36,10 @@ class CostBounds:
 
     def _computed_from_start(self) -> CostToGo:
         return CostToGo.from_start(self._problem, self._field).make_bound()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for so long; return True if the bounds that were started are there, or are left to who asks for them."""
+        return self._jobs is None or all(job is None or job.wait(seconds) for job in self._jobs)
 
     def make_to_goal(self) -> CostToGo:
         """Make the cost to the goal a lower bound; nothing else may use it meanwhile."""

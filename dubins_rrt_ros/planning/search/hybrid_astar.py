@@ -12,11 +12,13 @@ from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
 from ..curves.angles import wrap
 from ..curves.path import Path
+from ..deadline import never
 from ..problem import Problem
 from ..settings import Settings
-from .background import BACKGROUND
+from .background import BACKGROUND, BackgroundJob
 from .cost import path_cost
 from .cost_to_go import CostToGo
+from .pace import Pace
 from .smoothing import smooth
 
 #: Runs up to the first path: length of their arcs in turning radii, and number of headings of their closed set. The finer runs
@@ -44,6 +46,8 @@ MOST_IN_VAIN = 12
 SLACK = 1.05
 #: Maximum number of poses that a run expands.
 MOST_EXPANDED = 200_000
+#: Number of poses that are expanded at first before the time is looked at, and their maximum number later.
+FIRST_SLICE, LARGEST_SLICE = 16, 1024
 #: Number of headings that are tried at a goal where several will do.
 HEADINGS_AT_GOAL = 16
 
@@ -61,7 +65,8 @@ class HybridAStarRuns:
         self._settings = settings
         self._goals = _goals(problem)
         self._current: HybridAStar | None = None
-        self._in_background: Callable[[], Path | None] | None = None
+        self._in_background: BackgroundJob[Path | None] | None = None
+        self._pace = Pace(FIRST_SLICE, LARGEST_SLICE)
         self._started = self._in_vain = 0
         self.exhausted = False
 
@@ -78,14 +83,17 @@ class HybridAStarRuns:
         """True if the last run has ended."""
         return self._current is None
 
-    def start(self, expansions: int, best_cost: float) -> None:
+    def start(self, expansions: int, best_cost: float, interrupted: Callable[[], bool] = never) -> None:
         """Call `run` in the background; `collect` returns what it found."""
-        self._in_background = BACKGROUND.start(self.run, expansions, best_cost)
+        self._in_background = BACKGROUND.start(self.run, expansions, best_cost, interrupted)
 
-    def wait(self) -> None:
-        """Wait until nothing runs in the background."""
-        if self._in_background:
-            self._in_background()
+    def wait(self, seconds: float = math.inf) -> bool:
+        """Wait for so long until nothing runs in the background; return True if so."""
+        job = self._in_background
+        if not job or (seconds < math.inf and not job.wait(seconds)):
+            return not job
+        job()
+        return True
 
     def collect(self) -> Path | None:
         """Return the path that was found in the background, or None, once."""
@@ -93,18 +101,19 @@ class HybridAStarRuns:
         self._in_background = None
         return found
 
-    def run(self, expansions: int, best_cost: float) -> Path | None:
+    def run(self, expansions: int, best_cost: float, interrupted: Callable[[], bool] = never) -> Path | None:
         """Expand that many poses.
 
         Args:
             best_cost: cost of the best path so far [m]; infinite where there is none.
+            interrupted: called every few milliseconds; True ends the portion early.
 
         Returns:
             A path if the run came to one. Those that cost much more than `best_cost` are not sought; others are smoothed before
             they are compared with it, where the settings allow that.
         """
         run = self._current = self._current or self._next_run(best_cost)
-        run.run(expansions)
+        self._expand(run, expansions, interrupted)
         if not run.ended:
             return None
         self._current = None
@@ -115,11 +124,19 @@ class HybridAStarRuns:
         is_first = best_cost == math.inf
         if path and not is_first and self._settings.shortcut:
             for first_round in (True, False):
-                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round)
+                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, interrupted)
         self._count(path is not None and path_cost(path) < best_cost, is_first)
         # Not even arcs of all lengths lead anywhere from the start.
         self.exhausted = self.exhausted or (is_first and self._in_vain > len(FIRST_RUNS) and run.size == 1)
         return path
+
+    def _expand(self, run: HybridAStar, expansions: int, interrupted: Callable[[], bool]) -> None:
+        """Expand that many poses, in slices."""
+        while expansions > 0 and not run.ended and not interrupted():
+            size = min(self._pace.size, expansions)
+            with self._pace.measured(size):
+                run.run(size)
+            expansions -= size
 
     def _count(self, improved: bool, is_first: bool) -> None:
         """Count the runs in a row that were in vain."""

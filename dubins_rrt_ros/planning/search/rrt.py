@@ -36,6 +36,7 @@ from .._kernels.rrt import RrtKernel
 from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
+from ..deadline import Deadline, never
 from ..problem import Problem
 from ..settings import Settings
 from .cost import path_cost
@@ -62,6 +63,10 @@ BACKGROUND_EXPANSIONS, BACKGROUND_EXPANSIONS_OF_POLYGON = 1024, 128
 WITHOUT_PATH = 16
 #: Number of rounds of smoothing for the first path.
 ROUNDS = 3
+#: Time for which results from the background are waited for before the time is looked at [s].
+WAIT = 0.002
+#: Time that must be left for a bound to be computed here where the background has not begun it yet [s].
+TIME_FOR_BOUND = 0.25
 
 
 class Search:
@@ -71,16 +76,25 @@ class Search:
         samples: number of samples used so far.
         best: the node that reaches the goal at the least cost, or -1.
         found_by: what found the path there, before it was smoothed: hybrid_astar, rrt or rrt_star; "" without one.
+        ready: True if there is a path whose smoothing has been done; better ones that are still to be smoothed do not matter.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None):
-        """Prepare a search; `to_goal` is needed with `informed`, and with headings along the cost-to-go."""
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None,
+                 deadline: Deadline | None = None):
+        """Prepare a search.
+
+        Args:
+            to_goal: needed with `informed`, and with headings along the cost-to-go.
+            deadline: when it is over what is under way is cut short; the steps of `run` that follow it are unspecified.
+        """
         corners = problem.map.corners()
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
         self.samples = 0
         self.best = -1
         self.found_by = ""
+        self.ready = False
+        self._deadline = deadline or Deadline(math.inf, never)
         self._problem, self._settings = problem, settings
         self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
         self._kernel = RrtKernel(
@@ -92,7 +106,7 @@ class Search:
             self._runs = HybridAStarRuns(problem, settings, field, to_goal)
             self._bounds = CostBounds(problem, field, to_goal)
         self._sampler = Sampler(problem, settings, field, to_goal)
-        self._smoother = Smoother(vehicle, field, settings.seed)
+        self._smoother = Smoother(vehicle, field, settings.seed, self._deadline.poll)
 
     @property
     def size(self) -> int:
@@ -145,16 +159,18 @@ class Search:
         while not self.done:
             batch = yield from self._take_block(batch)
 
-    def wait(self) -> None:
-        """Wait until nothing of the search runs in the background."""
-        if self._runs:
-            self._runs.wait()
+    def wait(self, seconds: float = math.inf) -> bool:
+        """Wait for so long until nothing of the search runs in the background; return True if so."""
+        return self._runs is None or self._runs.wait(seconds)
 
-    def make_bound(self) -> CostToGo | None:
-        """Make the cost-to-go a lower bound, and return it; None unless the search is informed. It then waits for hybrid A*."""
-        if not self._bounds:
+    def make_bound(self, seconds: float = math.inf) -> CostToGo | None:
+        """Make the cost-to-go a lower bound, and return it.
+
+        Returns:
+            None unless the search is informed, and where what runs in the background does not end within that time.
+        """
+        if not self._bounds or not self.wait(seconds) or (seconds < math.inf and not self._bounds.wait(seconds)):
             return None
-        self.wait()
         return self._bounds.make_to_goal()
 
     def _may_end(self, smoothing_is_due: bool = False) -> bool:
@@ -166,7 +182,7 @@ class Search:
         while left > 0 and self.best < 0 and not runs.exhausted:
             expansions = min(EXPANSIONS, left)
             left -= expansions
-            self._insert_if_better(runs.run(expansions, math.inf))
+            self._insert_if_better(runs.run(expansions, math.inf, self._deadline.poll))
             yield self._may_end(smoothing_is_due=self._settings.shortcut)
 
     def _improve_first_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
@@ -176,6 +192,8 @@ class Search:
         if not self._is_rrt:
             yield from self._find_better_path(runs)
         yield from self._smooth(rounds[1:])
+        self.ready = True
+        yield self._may_end()
 
     def _find_better_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
         """Run hybrid A* once more, as far as its run ends soon."""
@@ -186,7 +204,7 @@ class Search:
             yield self._may_end()
 
     def _run_ended(self, runs: HybridAStarRuns, expansions: int) -> bool:
-        self._insert_if_better(runs.run(expansions, self.cost))
+        self._insert_if_better(runs.run(expansions, self.cost, self._deadline.poll))
         return runs.between_runs or runs.exhausted
 
     def _start_bounds(self) -> None:
@@ -198,19 +216,37 @@ class Search:
 
     def _take_block(self, batch: int) -> Generator[bool, None, int]:
         """Draw a block of samples and take it, batch by batch; return the size of the next batch."""
+        yield from self._wait_for_bounds()
         is_limited = self._limit_to_best()
         block = self._sampler.draw(BLOCK, self._bounds.from_start if self._bounds else None, self.path)
         used = 0
         while used < BLOCK and not self.done:
-            is_limited = is_limited or self._limit_to_best()
+            if not is_limited:
+                yield from self._wait_for_bounds()
+                is_limited = self._limit_to_best()
             had_path = self.best >= 0
             used, batch = self._take_batch(block, used, batch)
             if used == BLOCK:
+                yield from self._wait_for_runs()
                 self._end_block()
             rounds = self._rounds_due(had_path, used == BLOCK)
             yield self._may_end(smoothing_is_due=bool(rounds))
             yield from self._smooth(rounds)
+            if self.best >= 0 and not self.ready:
+                self.ready = True
+                yield self._may_end()
         return batch
+
+    def _wait_for_bounds(self) -> Iterator[bool]:
+        """Wait for the bounds that `_limit_to_best` needs, unless there is time to compute one of them here."""
+        if self._bounds and self.best >= 0 and self._bounds.from_start is None:
+            while self._deadline.left < TIME_FOR_BOUND and not self._bounds.wait(WAIT):
+                yield self._may_end()
+
+    def _wait_for_runs(self) -> Iterator[bool]:
+        """Wait for hybrid A* in the background."""
+        while self._runs and not self._runs.wait(WAIT):
+            yield self.best < 0
 
     def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
         """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
@@ -238,7 +274,8 @@ class Search:
         if not self._runs.exhausted:
             has_footprint = bool(self._problem.vehicle.footprint)
             expansions = BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS
-            self._runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost)
+            self._runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost,
+                             lambda: self._deadline.is_over)
 
     def _limit_to_best(self) -> bool:
         """Draw and add only what can be on a cheaper path than the best, and forget other nodes; False where nothing limits."""

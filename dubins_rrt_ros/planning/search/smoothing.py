@@ -1,6 +1,7 @@
 """Smoothing: shortcuts and moved waypoints make a path shorter, and keep it free."""
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -8,28 +9,38 @@ import numpy as np
 from .._kernels.shortcut import Shortcutter
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
+from ..deadline import never
 from ..vehicle import Vehicle
+from .pace import Pace
 
 #: Number of changes that are tried in one round.
 TRIES = 512
+#: Number of changes in the first slice of a round, after which the time is looked at.
+FIRST_SLICE = 16
 #: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
 FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
 #: Minimum gain of a round, relative to the cost, that makes another one worthwhile.
 WORTHWHILE_GAIN = 1e-4
 
 
-def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool) -> Path:
+def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool,
+           interrupted: Callable[[], bool] = never) -> Path:
     """Return a path with the same ends that is never longer.
 
     Args:
         path: it is free for the vehicle, and so is what is returned.
         first_round: True if it was not smoothed before, and may have large loops.
+        interrupted: called every few milliseconds; True ends the round with the path as it is by then.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
     shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius,
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
                               tries=TRIES)
-    shortcutter.improve(draws, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
+    pace, tried = Pace(FIRST_SLICE, TRIES), 0
+    while tried < TRIES and not interrupted():
+        begin, tried = tried, min(tried + pace.size, TRIES)
+        with pace.measured(tried - begin):
+            shortcutter.improve(draws, begin, tried, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
     waypoints, words, lengths = (np.array(view[:shortcutter.count])
                                  for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
     return Path(waypoints, words, lengths, path.radius)
@@ -38,8 +49,8 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
 class Smoother:
     """Smooths the best path of a search as long as that is worthwhile, by random numbers of its own."""
 
-    def __init__(self, vehicle: Vehicle, field: ClearanceField, seed: int):
-        self._vehicle, self._field, self._seed = vehicle, field, seed
+    def __init__(self, vehicle: Vehicle, field: ClearanceField, seed: int, interrupted: Callable[[], bool]):
+        self._vehicle, self._field, self._seed, self._interrupted = vehicle, field, seed, interrupted
         self._exhausted_at = math.inf
 
     @cached_property
@@ -48,7 +59,7 @@ class Smoother:
 
     def smooth(self, path: Path, first_round: bool) -> Path:
         """Return a path with the same ends that is never longer."""
-        return smooth(path, self._vehicle, self._field, self._rng, first_round)
+        return smooth(path, self._vehicle, self._field, self._rng, first_round, self._interrupted)
 
     def record(self, before: float, after: float) -> None:
         """Record the costs of the best path before and after a round."""
