@@ -296,7 +296,8 @@ class _Call:
         gap = gap_above(bound, path.length)
         above = f", at most {100 * gap:.1f} % above the shortest possible" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
-        drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else f"{'cancelled ' if cancelled else ''}before the first sample"
+        before = f"{'cancelled ' if cancelled else ''}before the first sample"
+        drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else before
         found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
         message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
         if self._problem.exact_goal:

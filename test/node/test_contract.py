@@ -41,8 +41,8 @@ SERVICES = [
 ]
 KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
         "path_length",
-        "lower_bound", "gap", "time_to_first", "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit", "seed",
-        "map_id", "stamp"]
+        "lower_bound", "gap", "time_to_first", "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit",
+        "seed", "map_id", "stamp"]
 
 OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)
 #: Of each status that get_plan can end in the code, the name, the level, the start and goal (with their frame) and the

@@ -290,7 +290,8 @@ def test_the_status_of_a_path_has_all_its_figures(over_the_wire, plans):
     assert told["map_id"] == plan.problem.map.id
     assert (int(told["samples"]), int(told["tree_nodes"])) == (plan.samples, len(plan.tree.poses))
     for key, figure in {"path_length": plan.length, "lower_bound": plan.lower_bound, "gap": plan.gap,
-                        "time_to_first": plan.time_to_first, "time_to_found": plan.time_to_found, "planning_time": plan.planning_time,
+                        "time_to_first": plan.time_to_first, "time_to_found": plan.time_to_found,
+                        "planning_time": plan.planning_time,
                         "min_clearance": plan.min_clearance, "max_curvature": plan.max_curvature}.items():
         assert float(told[key]) == figure, key
 
