@@ -134,7 +134,7 @@ class Maps:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a person should know of how the newest map's file was understood."""
+        """Warnings for a person about how the newest map's file was understood."""
         return self.map.warnings if isinstance(self.map, GridMap) else ()
 
     def take(self, world_map: Map, grid: GridMap, by_topic: bool = False) -> None:

@@ -153,7 +153,7 @@ def _tube(rng: np.random.Generator, vehicle: Vehicle, curves: tuple[DubinsCurve,
 
 @dataclass(frozen=True)
 class Family:
-    """How the vehicles and the maps of a family are made."""
+    """The functions that make the vehicles and the maps of a family."""
 
     vehicle: Callable[[np.random.Generator, float], Vehicle]
     map: Callable[[np.random.Generator, Vehicle, tuple[DubinsCurve, ...], float], Map]
