@@ -242,12 +242,17 @@ class PolygonClearance(Clearance):
         high: cython.int = -1
         row: cython.int
         column: cython.int
+        last: cython.int
         for row in range(first_row, last_row + 1):
-            for column in range(self.column_of(spans[row, 0]), self.column_of(spans[row, 1]) + 1):
-                if self.field[row, column] > 0:
+            column = self.column_of(spans[row, 0])
+            last = self.column_of(spans[row, 1])
+            while column <= last:
+                if self.field[row, column] > 0:  # as far as the bound reaches there is no edge
+                    column += 1 + cython.cast(cython.int, self.field[row, column] / self.resolution)
                     continue
                 left, right = min(left, column), max(right, column)
                 low, high = min(low, row), row
+                column += 1
         if high < 0:
             return True
         # Half a cell more, for rounding.
