@@ -16,7 +16,7 @@ from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import ArrayLike
 
 from dubins_rrt_ros.cli.common.plots import FAILURE, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
-from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle
+from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle, rasterise
 from dubins_rrt_ros.planning.collision.footprint import cover
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import SIDES, candidates, shortest
@@ -108,7 +108,8 @@ def _draw_arrow(axes: Axes, tail: tuple[float, float], tip: tuple[float, float],
 
 def collision_walk() -> Figure:
     """Draw conservative advancement along a curve."""
-    queries = advance(ClearanceField(ROOM), CURVE, DISC.robot_radius)
+    # On a grid whose cells are large enough to see: few looks on polygons need the exact distance.
+    queries = advance(ClearanceField(rasterise(ROOM, 0.1)), CURVE, DISC.robot_radius)
     exact = sum(query.is_exact for query in queries)
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.add_subplot()

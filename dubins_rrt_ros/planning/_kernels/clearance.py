@@ -235,29 +235,14 @@ class PolygonClearance(Clearance):
         return sqrt(self.edges.squared_distance(x, y))
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
-        """Return whether no edge is touched; the point where one is lies in a cell of the spans that is not above 0."""
-        left: cython.int = cython.cast(cython.int, self.field.shape[1])
-        right: cython.int = -1
-        low: cython.int = last_row + 1
-        high: cython.int = -1
+        """Return whether no edge is touched."""
+        left: cython.double = UNLIMITED
+        right: cython.double = -UNLIMITED
         row: cython.int
-        column: cython.int
-        last: cython.int
         for row in range(first_row, last_row + 1):
-            column = self.column_of(spans[row, 0])
-            last = self.column_of(spans[row, 1])
-            while column <= last:
-                if self.field[row, column] > 0:  # as far as the bound reaches there is no edge
-                    column += 1 + cython.cast(cython.int, self.field[row, column] / self.resolution)
-                    continue
-                left, right = min(left, column), max(right, column)
-                low, high = min(low, row), row
-                column += 1
-        if high < 0:
-            return True
-        # Half a cell more, for rounding.
-        return not self.edges.meets_sweep((left - 0.5) * self.resolution, (low - 0.5) * self.resolution,
-                                          (right + 1.5) * self.resolution, (high + 1.5) * self.resolution,
+            left, right = min(left, spans[row, 0]), max(right, spans[row, 1])
+        return not self.edges.meets_sweep(left - self.resolution, (first_row - 0.5) * self.resolution,
+                                          right + self.resolution, (last_row + 1.5) * self.resolution,
                                           corners, first, end, along, across)
 
 
