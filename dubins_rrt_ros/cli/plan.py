@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan
-from dubins_rrt_ros.planning.problem import LARGEST_YAW
+from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
 from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.example import ENDS, EXAMPLE, MAP

@@ -239,10 +239,11 @@ class _Call:
         if not audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
             return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audit)
-        self._keep(_Audited(path, audit, tree, samples, search.found_by if search else ""))
+        audited = _Audited(path, audit, tree, samples, search.found_by if search else "")
+        self._keep(audited)
         if search:
             self._bound = lower_bound(self._problem, search.make_bound(self._time_for_bound()))
-        return self._with_path(self._best, cancelled)
+        return self._with_path(self._best or audited, cancelled)
 
     def _time_for_bound(self) -> float:
         """Return how long the lower bound is waited for [s]: an answer of RRT, which ends with its first path, does not wait."""
