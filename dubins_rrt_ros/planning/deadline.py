@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 #: Time beyond the limit until which work that is nearly done may go on [s], and until which an audit may [s].
 GRACE, AUDIT_GRACE = 0.003, 0.006
-#: Time after a cancellation within which a path that was found can still be audited [s].
-CANCEL_GRACE = 0.01
+#: Time after a cancellation within which the search may come to where it is whole, so that it can be repeated by its samples, and
+#: within which the path that was found can be audited [s].
+CANCEL_GRACE, CANCEL_AUDIT_GRACE = 0.01, 0.02
 #: Time that a slice of work is to take [s].
 SLICE = 0.002
 
@@ -58,7 +59,7 @@ class Deadline:
     @property
     def is_over(self) -> bool:
         """True if the search has to end at once; any thread may ask."""
-        return self.cancelled or self.left <= self.reserve - GRACE
+        return self._is_cancelled_for(CANCEL_GRACE) or self.left <= self.reserve - GRACE
 
     def poll(self) -> bool:
         """Return `is_over`, after a look at the cancellation; for the thread of the request."""
@@ -73,5 +74,8 @@ class Deadline:
             OutOfTime: it is used up.
         """
         self.poll()
-        if self.left <= -AUDIT_GRACE or (self.cancelled and self.elapsed >= self._cancelled_at + CANCEL_GRACE):
+        if self.left <= -AUDIT_GRACE or self._is_cancelled_for(CANCEL_AUDIT_GRACE):
             raise OutOfTime
+
+    def _is_cancelled_for(self, time_since: float) -> bool:
+        return self.cancelled and self.elapsed >= self._cancelled_at + time_since

@@ -132,7 +132,7 @@ def test_a_figure_that_is_not_the_path_s_is_found(document, field, value, capsys
 def test_what_is_not_judged_is_named(document, capsys):
     file = write(document | {"colour": "red"})
     status, out, _ = run(file, "hall.wkt", "--json", "verdict.json", capsys=capsys)
-    named = ["message", "found_by", "samples", "tree_nodes", "time_to_first", "planning_time", "map_time",
+    named = ["message", "found_by", "samples", "tree_nodes", "time_to_first", "time_to_found", "planning_time", "map_time",
              "lower_bound (that no path is shorter)", "map", "version", "colour"]
     assert status == 0 and out.endswith(f"Not judged: {', '.join(named)}.\n")
     assert json.loads(Path("verdict.json").read_text())["not_judged"] == named

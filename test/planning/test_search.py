@@ -188,9 +188,9 @@ def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems):
 
 @needs_compiled
 def test_a_plan_that_ran_out_of_time_is_had_again_by_its_file(problems, monkeypatch):
-    for limit in (0.05, 0.2, 1.0, 3.0):
+    for limit in (0.1, 0.2, 0.4):
         with monkeypatch.context() as patched:
-            now = iter(np.arange(1e6) / 100)
+            now = iter(np.arange(1e6) / 10_000)
             patched.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda now=now: next(now))
             result = plan(problems["maze"], Settings(seed=3, samples=1_000_000, planning_time=limit))
         if result.path is None:
