@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.cases import empty_map, path_over, random_maps, random_pose, random_problem, scaled, search_on
+from support.cases import empty_map, path_over, random_maps, random_pose, random_problem, scaled, search_on, steps_of
 from support.planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import (
@@ -54,7 +54,7 @@ def test_shortest_curves_and_their_pieces_hold(start, goal, radius):
 def test_tree_and_path_hold_after_every_step(kind, seed):
     problem = a_problem(seed)
     search = search_on(problem, Settings(samples=scaled(800, least=60), seed=seed, **KINDS[kind]))
-    for _ in search.run():
+    for _ in steps_of(search):
         tree, path = search.tree, search.path
         tree.check()
         if path is not None:

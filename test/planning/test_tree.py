@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import naive
-from support.cases import SCALE, boxes_grid, finish, free_pose, holed_polygons, naive_clearance, scaled, search_on
+from support.cases import SCALE, boxes_grid, finish, free_pose, holed_polygons, naive_clearance, scaled, search_on, steps_of
 
 from dubins_rrt_ros.planning import ClearanceField, Problem, Settings, Tree, TreeError, Vehicle
 
@@ -41,7 +41,7 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
         field = ClearanceField(problem.map)
         settings = Settings(planner=planner, samples=scaled(1200, least=100), step_size=step_size, seed=seed, **options)
         search = search_on(problem, settings)
-        for _ in search.run():
+        for _ in steps_of(search):
             tree = search.tree
             tree.check(field, VEHICLE)
             assert len(tree) == search.size

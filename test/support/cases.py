@@ -138,9 +138,17 @@ def search_on(problem, settings):
     return Search(problem, settings, field, CostToGo.to_goal(problem, field))
 
 
+def steps_of(search):
+    """The steps of a search, which without a path would go on for ever, up to its budget of samples."""
+    for may_end in search.run():
+        yield may_end
+        if search.best < 0 and search.samples >= search._settings.samples:
+            return
+
+
 def finish(search):
     """The search, when it is done."""
-    for _ in search.run():
+    for _ in steps_of(search):
         pass
     return search
 
