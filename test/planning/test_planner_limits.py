@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from support.cases import SCALE, empty_map
+from support.cases import SCALE, empty_map, needs_compiled
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit_path, plan, prepare
@@ -90,6 +90,7 @@ def test_the_sample_budget_ends_it(planner):
     assert result.samples == 200
 
 
+@needs_compiled
 def test_a_search_without_a_path_goes_on_beyond_the_budget(planner):
     result = plan(hard_to_reach(), settings(planner, samples=200, planning_time=0.5))
     assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "allow more time")

@@ -20,7 +20,7 @@ def test_random_problems(planner, count):
     statuses = []
     for seed in range(count):
         problem, clearance = random_problem(rng, random_maps(30)[seed % 30])
-        settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=1.0,
+        settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=1.0 if SCALE == 1 else 20.0,
                             step_size=float(rng.choice([0.0, 0.0, 1.0])),
                             heading_sampling=str(rng.choice(["uniform", "goal", "field", "mixed"])),
                             informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6))
