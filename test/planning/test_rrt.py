@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.cases import SCALE, boxes_grid, contents, empty_map, field_of, finish, needs_compiled, scaled, search_on
+from support.cases import SCALE, boxes_grid, contents, empty_map, field_of, finish, needs_compiled, scaled, search_on, steps_of
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map
 from dubins_rrt_ros.planning.curves.dubins import shortest
@@ -24,7 +24,7 @@ def maze():
 def searched(problem, **options):
     """A finished search, of the plain algorithm unless the options say otherwise, with the best length after every batch."""
     search, lengths = search_on(problem, Settings(**{"seed": 1, "samples": scaled(1500), **PLAIN, **options})), []
-    for _ in search.run():
+    for _ in steps_of(search):
         lengths.append(math.inf if search.length is None else search.length)
     return search, lengths
 

@@ -4,7 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from support.cases import SCALE, boxes_grid, empty_map, field_of, holed_polygons, maze_grid, path_over, scaled, search_on
+from support.cases import (
+    SCALE,
+    boxes_grid,
+    empty_map,
+    field_of,
+    holed_polygons,
+    maze_grid,
+    path_over,
+    scaled,
+    search_on,
+    steps_of,
+)
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle
 from dubins_rrt_ros.planning.search import rrt, sampling
@@ -163,7 +174,7 @@ def test_nodes_are_added_only_where_a_path_shorter_than_the_best_may_lead(shortc
     drawing = Drawing(problem)
     search = search_on(problem, Settings(samples=scaled(4 * rrt.BLOCK, least=2 * rrt.BLOCK), seed=1, shortcut=shortcut))
     at_blocks = []
-    for _ in search.run():
+    for _ in steps_of(search):
         if search.samples % rrt.BLOCK == 0 and search.length is not None:
             at_blocks.append((search.size, search.length))
     assert at_blocks

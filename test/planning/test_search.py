@@ -18,6 +18,7 @@ from support.cases import (
     random_problem,
     scaled,
     search_on,
+    steps_of,
 )
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, audit_path, load_map, plan
@@ -113,7 +114,7 @@ def test_the_best_path_on_random_problems(seed):
         return
     step, best = float(rng.choice([0.0, 0.5])), math.inf
     search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step))
-    for _ in search.run():
+    for _ in steps_of(search):
         if search.best >= 0:
             assert search.length <= best
             best = search.length
@@ -157,7 +158,7 @@ def test_what_is_left_out_would_not_have_helped():
 @pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
-    """While the bounds are still computed in the background."""
+    """While the bounds are still computed in the background; an answer of RRT does not wait for it."""
     side = 700 if SCALE == 1 else 60
     data = np.zeros((side, side))
     data[side // 4:side // 2:side // 8, side // 10:-side // 10] = 100
@@ -166,14 +167,16 @@ def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
     for seed in range(scaled(15, least=2)):
         result = plan(problem, Settings(planner=planner, samples=1, seed=seed, planning_time=60.0))
         assert result.status == Status.NONE
-        assert result.lower_bound == expected <= result.length
+        assert result.lower_bound <= expected <= result.length
+        assert planner == "rrt" or result.lower_bound == expected
 
 
 @needs_compiled
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 @pytest.mark.parametrize("asked", [3, 4, 5, 6, 7, 9, 12, 16, 30, 60])
-def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems):
-    """By seed and number of samples, also where hybrid A* found the path before the first one."""
+def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems, monkeypatch):
+    """By seed and number of samples, also where hybrid A* found the path before the first one, on however slow a machine."""
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.CANCEL_GRACE", 600.0)
     count = []
     result = plan(problems["maze"], Settings(planner=planner, seed=3, samples=scaled(3000), planning_time=600.0),
                   cancel=lambda: count.append(1) or len(count) >= asked)
