@@ -120,9 +120,15 @@ def test_the_map_is_published_or_subscribed_to_and_not_both(with_file, without_f
 def test_a_service_has_its_name_and_type(with_file, name, kind):
     _, client = with_file
     namespace = client.node.get_namespace()
-    services = client.wait_for(lambda: (found := dict(client.node.get_service_names_and_types_by_node("planner", namespace)))
-                               .keys() >= {f"{namespace}/{name}"} and found, f"the service {name}")
-    assert services[f"{namespace}/{name}"] == [kind]
+
+    def kinds():
+        try:
+            found = client.node.get_service_names_and_types_by_node("planner", namespace)
+        except NodeNameNonExistentError:  # not yet
+            return None
+        return dict(found).get(f"{namespace}/{name}")
+
+    assert client.wait_for(kinds, f"the service {name}") == [kind]
 
 
 def test_every_name_is_relative_and_can_be_remapped(module_planners, with_file):

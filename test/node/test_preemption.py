@@ -74,7 +74,8 @@ def test_the_newest_goal_wins_and_nothing_of_the_old_one_comes_after(talk):
     order = [GOAL[:2], BEHIND[:2], GOAL[:2], BEHIND[:2]]
     client.wait_for(lambda: in_order(goals_of_paths(client), [*order, None]), "the empty path")
     client.wait_for(lambda: in_order(goals_of_trees(client), [*order, OCCUPIED[:2], None]), "the clearing")
-    assert in_order(plan_ids(client), [1, 2, 3, 4, 5, 6])
+    told = [plan_id for plan_id in plan_ids(client) if plan_id]  # the client may still have heard that no start is there
+    assert in_order(told, [1, 2, 3, 4, 5, 6])
 
 
 def test_a_goal_that_is_refused_replaces_the_one_before(talk):
