@@ -162,6 +162,12 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds
                    thresholds=thresholds)
 
 
+def is_same_grid(one: GridMap, other: GridMap) -> bool:
+    """Return True if two grids have the same cells at the same places, which are taken alike."""
+    return ((one.resolution, one.origin, one.thresholds) == (other.resolution, other.origin, other.thresholds)
+            and np.array_equal(one.data, other.data))
+
+
 def grid_message(grid: GridMap, frame: str, stamp: Time) -> OccupancyGrid:
     """Return a grid map as a message."""
     message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame))

@@ -15,9 +15,11 @@ from dubins_rrt_ros.planning.text import one_line
 
 from .parameter_files import as_yaml, unused_files
 from .parameter_table import as_table
-from .parameters import OPTIONS
+from .parameters import AS_TEXT, OPTIONS
 from .planner_node import PlannerNode
 
+#: What ROS says of a list of lists in a parameter file.
+NESTED_LIST = "Sequences cannot be key"
 #: Maximum time until a signal is noticed [s].
 SIGNAL_INTERVAL = 0.25
 
@@ -77,7 +79,7 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
     try:
         rclpy.init(args=arguments)
     except RuntimeError as error:  # a ROS argument or a parameter file that cannot be read
-        raise ConfigurationError(one_line(str(error))) from error
+        raise _refused_by_ros(error) from error
     try:
         node = PlannerNode()
     except MapError as error:
@@ -108,5 +110,11 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     try:
         own = remove_ros_args(arguments)[1:]
     except RuntimeError as error:
-        raise ConfigurationError(one_line(str(error))) from error
+        raise _refused_by_ros(error) from error
     return parser.parse_args(own)
+
+
+def _refused_by_ros(error: RuntimeError) -> ConfigurationError:
+    """Return what ROS says of its arguments, with the remedy where it met a list of lists."""
+    hint = f"; give a footprint {AS_TEXT}: footprint: \"[[x, y], ...]\"" if NESTED_LIST in str(error) else ""
+    return ConfigurationError(one_line(str(error)) + hint)

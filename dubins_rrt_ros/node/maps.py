@@ -16,7 +16,7 @@ from dubins_rrt_ros.planning.collision.footprint import summary
 from dubins_rrt_ros.planning.maps.locate import find_map
 from dubins_rrt_ros.planning.text import one_line
 
-from .conversions import as_grid, grid_from, grid_message
+from .conversions import as_grid, grid_from, grid_message, is_same_grid
 from .executor_queue import ExecutorQueue
 from .outcome import Outcome
 from .parameters import NodeOptions, Parameters
@@ -188,7 +188,16 @@ class Maps:
         except MapError as error:
             self.refuse(error, log_again=False)  # it may come each second
         else:
-            self.take(grid, grid, by_topic=True)
+            if self._came_by_topic and self.grid is not None and is_same_grid(grid, self.grid):
+                self._keep()
+            else:
+                self.take(grid, grid, by_topic=True)
+
+    def _keep(self) -> None:
+        """Stay with the map, which came again: a publisher may repeat it each second."""
+        if self.refusal:
+            self.refusal = ""
+            self._queue.post(self._on_news)
 
     def _on_parameters(self, changes: list[Parameter]) -> None:
         """Take the map that came by topic by other thresholds, where these changed."""

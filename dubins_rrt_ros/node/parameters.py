@@ -72,6 +72,8 @@ class Configuration:
 #: The classes whose options are parameters, and the titles of their sections.
 CLASSES = {NodeOptions: "The node", Vehicle: "The vehicle", Problem: "The request", Settings: "The planner"}
 OPTIONS: dict[str, Option] = {item.name: item for cls in CLASSES for item in options(cls)}
+#: How a list of lists is given as a parameter.
+AS_TEXT = "as text, in quotes, since ROS has no lists of lists"
 _RESTART = "start the node again with another value"
 #: Parameters that cannot be changed at run time, and what to do instead. They shape topics, where a change would have no
 #: effect, or limit what anyone on the network may do.
@@ -179,7 +181,7 @@ def descriptor(item: Option) -> ParameterDescriptor:
 def _declare(node: Any, item: Option) -> None:
     # The full descriptor comes after our own check: a refusal by its range names no remedy.
     parameter = node.declare_parameter(item.name, item.default, ParameterDescriptor(dynamic_typing=True))
-    item.convert(parameter.value)
+    _convert(item, parameter.value)
     node.set_parameters([_as_declared(parameter)])
     node.set_descriptor(item.name, descriptor(item))
 
@@ -198,7 +200,17 @@ def _as_declared(parameter: Any) -> Any:
 def _check_alone(name: str, value: Any) -> None:
     if name in READ_ONLY:
         raise OptionError(f"{name} is {read_only(name)}")
-    OPTIONS[name].convert(value)
+    _convert(OPTIONS[name], value)
+
+
+def _convert(item: Option, value: Any) -> Any:
+    """Return a parameter's value as the option's field holds it; a refusal says how a list is written."""
+    try:
+        return item.convert(value)
+    except OptionError as error:
+        if not item.text_form or isinstance(value, str):
+            raise
+        raise OptionError(f"{error}, {AS_TEXT}") from None
 
 
 def read_only(name: str) -> str:

@@ -9,6 +9,8 @@ import textwrap
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
 from .errors import PlanningError
 from .text import quoted
 
@@ -71,13 +73,14 @@ class Option(NamedTuple):
         return f"a number from {self.low:g} to {self.high:g}"
 
     def convert(self, value: Any) -> Any:
-        """Return `value` as the field holds it; an int is taken where a float is due.
+        """Return `value` as the field holds it; an int is taken where a float is due, and a NumPy number as Python's own.
 
         Raises:
             OptionError: the value is of another type, not finite or out of range.
         """
         if self.text_form:
             return self.text_form.read(value)
+        value = plain_number(value)
         if not self._takes(value):
             raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}")
         return float(value) if self.type is float else value
@@ -124,8 +127,14 @@ def convert_options(instance: Any) -> None:
         object.__setattr__(instance, item.name, item.convert(getattr(instance, item.name)))
 
 
+def plain_number(value: Any) -> Any:
+    """Return a number or Boolean of NumPy as Python's own, and anything else as it is."""
+    return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+
+
 def is_number(value: Any) -> bool:
     """Return True for a finite float, and for an integer that a float can hold; true and false are no numbers."""
+    value = plain_number(value)
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 

@@ -108,7 +108,7 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
         InvalidPose: it has not three finite numbers, or too large a yaw; `name` is in the message.
     """
     try:
-        numbers = tuple(map(float, pose))
+        numbers = () if isinstance(pose, str | bytes | dict | set) else tuple(map(float, pose))
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -20,6 +21,10 @@ Footprint = tuple[Point, ...]
 
 #: Maximum number of corners of a footprint.
 MAX_CORNERS = 100
+#: The text of a corner, and that of an outline: as in JSON and in Nav2's parameters, with .3, 3. and a comma at the end.
+_NUMBER = r"\s*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+_CORNER = re.compile(rf"\[{_NUMBER},{_NUMBER}(?:,\s*)?\]", re.ASCII)
+_OUTLINE = re.compile(rf"\s*\[\s*(?:{_CORNER.pattern}\s*,\s*)*(?:{_CORNER.pattern}\s*)?\]\s*", re.ASCII)
 
 
 def overridden(given: Collection[str]) -> dict[str, str]:
@@ -35,25 +40,30 @@ def _read_footprint(value: Any) -> Footprint:
     """
     if isinstance(value, str):
         return _read_footprint_text(value)
-    return _checked_corners(value.tolist() if isinstance(value, np.ndarray) else value, value)
+    corners = _as_list(value)
+    return _checked_corners([_as_list(corner) for corner in corners] if isinstance(corners, list) else None, value)
+
+
+def _as_list(value: Any) -> Any:
+    """Return a sequence or an array as a list, and anything else as it is."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return list(value) if isinstance(value, list | tuple) else value
 
 
 @lru_cache(maxsize=64)
 def _read_footprint_text(text: str) -> Footprint:
-    if not text:
+    if not text.strip():
         return ()
-    try:
-        corners = json.loads(text)
-    except (ValueError, RecursionError):
-        corners = None
-    return _checked_corners(corners, text)
+    is_outline = _OUTLINE.fullmatch(text)
+    return _checked_corners([list(map(float, corner)) for corner in _CORNER.findall(text)] if is_outline else None, text)
 
 
-def _checked_corners(given: Any, value: Any) -> Footprint:
+def _checked_corners(given: list[Any] | None, value: Any) -> Footprint:
     """Return corners as a polygon around the reference point has them; `value` is what messages show."""
-    if given == ():
+    if given == []:
         return ()
-    if not (isinstance(given, list | tuple) and 3 <= len(given) <= MAX_CORNERS and all(map(_is_corner, given))):
+    if not (given and 3 <= len(given) <= MAX_CORNERS and all(map(_is_corner, given))):
         raise _refused(value, f"give at least three corners in metres, {MAX_CORNERS} at most")
     corners = tuple((float(x), float(y)) for x, y in given)
     polygon = shapely.Polygon(corners)
@@ -65,7 +75,7 @@ def _checked_corners(given: Any, value: Any) -> Footprint:
 
 
 def _is_corner(value: Any) -> bool:
-    return isinstance(value, list | tuple) and len(value) == 2 and all(map(is_number, value))
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
 
 
 def _refused(value: Any, reason: str) -> OptionError:

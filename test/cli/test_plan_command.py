@@ -188,6 +188,12 @@ def test_every_option_is_a_flag(hall, capsys):
     assert document["settings"].items() >= told.items()
 
 
+def test_a_footprint_is_taken_as_nav2_writes_it(hall, capsys):
+    footprint = "[[.3,.2],[.3,-.2],[-.3,-.2],[-.3,.2],]"
+    _, out, _ = run(hall, *REQUEST, *BUDGET, "--footprint", footprint, "--json", "-", capsys=capsys)
+    assert json.loads(out)["vehicle"]["footprint"] == "[[-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2], [0.3, 0.2]]"
+
+
 @pytest.mark.parametrize(("flags", "names"), [
     (["--turning-radius", "-1"], "turning_radius is -1"), (["--turning-radius", "wide"], "--turning-radius"),
     (["--samples", "0"], "samples is 0"), (["--planner", "a_star"], "--planner"),

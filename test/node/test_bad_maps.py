@@ -55,9 +55,9 @@ def on_other_maps(talk):
 
 def take(talk, message):
     """Publish a map and wait until it is planned on."""
-    said, wanted = len(talk.process.output), grid_from(message, "map", 20_000).id
+    wanted = grid_from(message, "map", 20_000).id
     talk.client.publish_map(message)
-    talk.client.wait_for(lambda: f"The map is ready, id {wanted}" in talk.process.output[said:], "the map to be taken")
+    talk.client.wait_for(lambda: talk.process.map_id == wanted, "the map to be taken")
 
 
 def refusal(talk, said):

@@ -1,5 +1,7 @@
 """A footprint as the node's parameter: a parked car, and a pose that a disc could take and the footprint cannot."""
 
+from pathlib import Path
+
 import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -35,3 +37,24 @@ def test_the_pose_must_hold_the_whole_car(running):
     client.set_parameters(footprint="", robot_radius=0.9, planning_time=0.5)
     _, told = client.plan(ACROSS, BAY)
     assert told["message"].startswith("No path within planning_time 0.5 s: "), told["message"]
+
+
+@pytest.mark.parametrize("arguments", [
+    ["-p", f"footprint:={CAR}"], ["-p", "footprint:=[3.6, 0.9, -0.9, 0.9, -0.9, -0.9]"], ["--params-file", "lists.yaml"]])
+def test_a_footprint_as_lists_of_yaml_is_refused_with_the_advice_to_quote_it(planners, arguments, tmp_path, monkeypatch):
+    """Of a list of lists on the command line ROS takes the last one."""
+    monkeypatch.chdir(tmp_path)
+    Path("lists.yaml").write_text(f"/**:\n  ros__parameters:\n    footprint: {CAR}\n")
+    process = planners.start(*arguments)
+    assert process.wait() == 1
+    line = process.output.splitlines()[-1]
+    assert line.startswith("planner: ") and "footprint" in line and "as text, in quotes" in line
+
+
+def test_a_footprint_in_quotes_is_taken_as_nav2_writes_it(planners, tmp_path):
+    file = tmp_path / "p.yaml"
+    footprint = "[[.3, .2], [.3, -.2], [-.3, -.2], [-.3, .2], ]"
+    file.write_text(f'/**:\n  ros__parameters:\n    map_file: maze\n    footprint: "{footprint}"\n')
+    process = planners.start("--params-file", str(file))
+    planners.client().wait_for_word("The map is ready")
+    assert "for a footprint of 4 corners" in process.output

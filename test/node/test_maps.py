@@ -48,10 +48,8 @@ def plain(module_planners):
 
 def publish(client, process, cells):
     """Publish a map; it is in use and prepared when this returns."""
-    ready = f"The map is ready, id {id_of(cells)}"
-    before = process.output.count(ready)
     client.publish_map(occupancy(cells))
-    client.wait_for(lambda: process.output.count(ready) > before, f"{ready!r} in the log")
+    client.wait_for(lambda: process.map_id == id_of(cells), f"the map {id_of(cells)} to be taken")
 
 
 def show_path(client, process):
@@ -61,6 +59,28 @@ def show_path(client, process):
     publish(client, process, FREE)
     client.send("start_pose", START)
     return end_of_goal(client)
+
+
+def test_a_map_that_comes_again_and_again_is_said_once(plain):
+    client, process = plain[1], plain[0]
+    publish(client, process, DETOUR)
+    said = len(process.output)
+    for _ in range(5):
+        client.publish_map(occupancy(DETOUR))
+        client.call(Trigger, "cancel")
+    publish(client, process, HARMLESS)
+    lines = process.output[said:].splitlines()
+    assert sum("Took a map" in line for line in lines) == sum("The map is ready" in line for line in lines) == 1, lines
+
+
+def test_a_map_that_comes_again_after_a_refused_one_ends_the_remark_on_an_older_map(plain):
+    process, client = plain
+    client.set_parameters(**QUICK)
+    publish(client, process, FREE)
+    client.publish_map(occupancy(FREE, frame="odom"))
+    client.wait_for(lambda: "on an older map" in client.plan(START, GOAL)[1]["message"], "the remark")
+    client.publish_map(occupancy(FREE))
+    client.wait_for(lambda: "on an older map" not in client.plan(START, GOAL)[1]["message"], "an answer without the remark")
 
 
 def end_of_goal(client):

@@ -71,8 +71,14 @@ def test_a_number_takes_its_range_and_integers(cls, item):
     beyond = math.nextafter(item.low, -math.inf), math.nextafter(item.high, math.inf)
     for value in (*beyond, math.nan, math.inf, -math.inf):
         assert_refused(cls, item, value)
-    for value in ("1", None, True, [1.0], 1j, np.float32(item.default)):
+    for value in ("1", None, True, [1.0], 1j):
         assert_refused(cls, item, value)
+    for kind in (np.float32, np.float64, np.int64, np.array):
+        taken = getattr(make(cls, item, kind(whole)), item.name) if item.low <= whole <= item.high else float(whole)
+        assert type(taken) is float and taken == whole
+    for value in (np.float64(math.nan), np.float64(beyond[1]), np.True_, np.array([1.0]), np.complex128(1)):
+        with pytest.raises(OptionError, match=f"^{item.name} is .*; it takes "):
+            make(cls, item, value)
 
 
 @names(int)
@@ -81,12 +87,18 @@ def test_an_integer_takes_its_range(cls, item):
         assert getattr(make(cls, item, value), item.name) == value
     for value in (item.low - 1, item.high + 1, 1.0, 1.5, math.nan, "1", None, True):
         assert_refused(cls, item, value)
+    taken = getattr(make(cls, item, np.arange(item.low, item.low + 2)[1]), item.name)
+    assert type(taken) is int and taken == item.low + 1
+    for value in (np.float64(1), np.True_):
+        with pytest.raises(OptionError, match=f"^{item.name} is .*; it takes "):
+            make(cls, item, value)
 
 
 @names(bool)
 def test_a_switch_takes_true_and_false(cls, item):
     for value in (True, False):
         assert getattr(make(cls, item, value), item.name) is value
+        assert getattr(make(cls, item, np.bool_(value)), item.name) is value
     for value in (1, 0, "true", None, 1.0):
         assert_refused(cls, item, value)
 
@@ -134,7 +146,7 @@ def test_wheelbase_and_steering_angle_go_together(half):
 
 @pytest.mark.parametrize("pose", [
     (0, 0), (0, 0, 0, 0), (math.nan, 0, 0), (0, math.inf, 0), (0, 0, -math.inf), "abc", None, 5, (10**400, 0, 0),
-    (None, 0, 0), ("x", 0, 0), ()])
+    (None, 0, 0), ("x", 0, 0), (), "123", b"123", {1, 2, 3}])
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_invalid_pose(end, pose):
     ends = {"start": (1, 1, 0), "goal": (2, 2, 0), end: pose}
@@ -143,7 +155,8 @@ def test_invalid_pose(end, pose):
 
 
 def test_poses_become_floats():
-    problem = Problem(MAP, Vehicle(), np.array([1, 1, 0]), [2, 2, 1])
+    problem = Problem(MAP, Vehicle(), np.array([1, 1, 0]), [np.float32(2), np.int8(2), 1], np.float64(0.5))
+    assert problem.goal_tolerance_xy == 0.5
     assert problem.start == (1.0, 1.0, 0.0)
     assert all(type(number) is float for number in problem.start + problem.goal)
     assert checked_pose("start", (1, 2, 3)) == (1.0, 2.0, 3.0)

@@ -30,11 +30,14 @@ def test_a_vehicle_is_made_again_from_its_values():
 
 def test_a_footprint_is_its_corners_counter_clockwise():
     corners = ((1.0, 0.0), (0.0, 1.0), (-1.0, -1.0))
-    for given in (corners, list(corners), np.array(corners), "[[1, 0], [0, 1], [-1, -1]]"):
+    for given in (corners, list(corners), np.array(corners), [np.array(corner) for corner in corners],
+                  [[np.float64(x), np.int64(y)] for x, y in corners], "[[1, 0], [0, 1], [-1, -1]]",
+                  "[[1., .0], [+0, 1e0], [-1, -1.0,],]"):
         assert Vehicle(footprint=given).footprint == corners
         assert Vehicle.from_footprint(given, turning_radius=2.0) == Vehicle(2.0, footprint=corners)
     assert Vehicle(footprint=corners[::-1]).footprint == ((-1.0, -1.0), (0.0, 1.0), (1.0, 0.0))[::-1]
-    assert Vehicle().footprint == () == Vehicle(footprint="").footprint
+    for nothing in ("", "[]", " [ ] ", (), [], np.empty((0, 2))):
+        assert Vehicle(footprint=nothing).footprint == () == Vehicle().footprint
 
 
 def test_its_text_is_what_files_and_parameters_hold():
@@ -57,13 +60,14 @@ def test_a_vehicle_of_a_wheelbase():
 
 
 def test_a_vehicle_of_no_footprint_is_refused():
-    for nothing in ((), "", []):
+    for nothing in ((), "", [], "[]"):
         with pytest.raises(OptionError, match="give at least three corners"):
             Vehicle.from_footprint(nothing)
 
 
 @pytest.mark.parametrize("footprint", [
-    [], None, 5, [1, 2, 3], [(1, 0), (0, 1)], [(1, 0), (0, 1), (-1, "x")], "[]",
+    None, 5, [1, 2, 3], [(1, 0), (0, 1)], [(1, 0), (0, 1), (-1, "x")], [(1, 0), (0, 1), (-1, True)], np.ones(3), np.ones((3, 3)),
+    "[[1, 0], [0, 1], [1e999, 0]]", "[[1, 0], [0, 1], [., 0]]", "[[1, 0], [0, 1], [1 0]]", "[[1, 0], [0, 1], [1, 0]",
     "[[1, 0], [0, 1]]", "[[1, 0], [0, 1], [1]]", "[[1, 0], [0, 1], [1, 2, 3]]", "[[1, 0], [0, 1], [NaN, 0]]",
     "[[1, 0], [0, 1], [Infinity, 0]]", "[[1, 0], [0, 1], [\"a\", 0]]", "[1, 2, 3]", "{}", "3", "null", "a car", "[" * 100_000])
 def test_a_footprint_that_is_no_outline_is_refused_with_an_example(footprint):

@@ -40,6 +40,11 @@ class NodeProcess:
         with self._heard:
             return "".join(self._lines)
 
+    @property
+    def map_id(self) -> str:
+        """The id of the map that is in use and prepared, by its log."""
+        return self.output.rpartition("The map is ready, id ")[2][:12]
+
     def wait_until_ready(self) -> None:
         """Until it has said its first word, which it does once it is on the network."""
         with self._heard:
