@@ -9,6 +9,7 @@ import pytest
 import shapely
 from PIL import Image
 from support.images import pgm, row_of
+from support.map_files import FIELDS, image_named, refusal, write_grid, yaml_of
 
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
 from dubins_rrt_ros.planning.maps.files import load_map
@@ -18,33 +19,9 @@ from dubins_rrt_ros.planning.option import OptionError
 from dubins_rrt_ros.planning.text import LONGEST
 
 MAPS = Path(__file__).parents[2] / "maps"
-FIELDS = {"image": "m.pgm", "resolution": "0.05", "origin": "[0, 0, 0]", "negate": "0",
-          "occupied_thresh": "0.65", "free_thresh": "0.196"}
 RED, BLUE, GREEN, YELLOW, WHITE = (255, 0, 0), (0, 0, 255), (0, 255, 0), (255, 255, 0), (255, 255, 255)
-REMEDIES = ("give", "save", "correct", "name ", "make", "convert", "crop", "copy", "split", "mark", "choose")
 
 
-def yaml_of(fields):
-    return "".join(f"{key}: {value}\n" for key, value in fields.items() if value is not None)
-
-
-def write_grid(folder, rows=((254, 0, 205),), name="m.pgm", **changes):
-    """Write a pair and return the YAML's path; a field that is changed to None is left out."""
-    (folder / name).write_bytes(pgm(rows))
-    (folder / "m.yaml").write_text(yaml_of({**FIELDS, "image": name, **changes}), "utf-8")
-    return folder / "m.yaml"
-
-
-def refusal(path, kind=MapError, **options):
-    """The message of a refusal of a kind, that must be one printable line with the file's name and a remedy."""
-    with pytest.raises(MapError) as caught:
-        load_map(path, **options)
-    assert type(caught.value) is kind
-    message = str(caught.value)
-    assert message.isprintable()
-    assert message.startswith(f"{path}: ")
-    assert any(word in message.split("; ")[-1] for word in REMEDIES), message
-    return message
 
 
 def test_first_image_row_is_the_top_of_the_map(tmp_path):
@@ -263,12 +240,6 @@ def test_bad_field(tmp_path, field, values):
         assert field in refusal(path, kind), value
 
 
-def image_named(folder, value):
-    path = write_grid(folder)
-    path.write_text(yaml_of({**FIELDS, "image": value}), "utf-8")
-    return path
-
-
 @pytest.mark.parametrize("content, word", [
     (b"", "empty"), (b" \n", "empty"), (b"\xff\xfe", "UTF-8"), (b"# a map\n\n# of nothing\n", "has no fields but comments"),
     (b"a: [", "YAML"), (b"- 1\n- 2\n", "YAML"),
@@ -340,76 +311,6 @@ def test_bad_polygons_name_the_file(tmp_path):
     feature = {"type": "Feature", "properties": {"name": name}, "geometry": None}
     (tmp_path / "bad.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
     assert "feature 1 ('a" in refusal(tmp_path / "bad.geojson")
-
-
-@pytest.fixture
-def maps(tmp_path):
-    """A folder with a map, and beside it others and links to and fro."""
-    inside, outside = tmp_path / "maps", tmp_path / "other"
-    for folder in (inside, inside / "deep", outside):
-        folder.mkdir()
-        write_grid(folder)
-        (folder / "yard.wkt").write_text("POLYGON ((0 0, 2 0, 2 2, 0 2, 0 0))")
-    links = {"out": "../other", "out.yaml": "../other/m.yaml", "out.wkt": "../other/yard.wkt", "out.pgm": "../other/m.pgm",
-             "loop.yaml": "loop.yaml", "in.yaml": "deep/m.yaml"}
-    for name, target in links.items():
-        (inside / name).symlink_to(target)
-    (outside / "in").symlink_to("../maps")
-    (tmp_path / "mapsack.wkt").write_text("POLYGON ((0 0, 2 0, 2 2, 0 2, 0 0))")
-    return inside
-
-
-@pytest.mark.parametrize("name", [
-    "m.yaml", "yard.wkt", "deep/m.yaml", "deep/../yard.wkt", "in.yaml", "../other/in/m.yaml", "../maps/yard.wkt",
-    "deep/../../maps/m.yaml"])
-@pytest.mark.parametrize("directory", ["maps", "maps/", "other/in", "."])
-def test_files_inside_the_map_directory_are_read(maps, name, directory):
-    assert load_map(maps / name, map_directory=str(maps.parent / directory))
-
-
-@pytest.mark.parametrize("name", [
-    "out.yaml", "out.wkt", "out/m.yaml", "../other/yard.wkt", "deep/../../other/m.yaml", "../mapsack.wkt", "../maps",
-    "../other/x.txt", "/etc/passwd", "/dev/zero", "..", "../gone.yaml"])
-def test_files_outside_the_map_directory_are_refused(maps, name):
-    path = maps / name
-    with pytest.raises(MapNotFound, match="is outside of map_directory = .*; name a file in there") as caught:
-        load_map(path, map_directory=str(maps / "deep" if name == "../maps" else maps))
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-@pytest.mark.parametrize("name", ["../other/m.pgm", "{}/m.pgm", "out.pgm", "out/m.pgm", "deep/../../other/m.pgm", "/dev/zero"])
-def test_an_image_outside_the_map_directory_is_refused(maps, name):
-    name = name.format(maps.parent / "other")
-    path = image_named(maps, name)
-    message = refusal(path, MapNotFound, map_directory=str(maps))
-    assert f"image {name!r} is outside of map_directory = {maps}" in message
-    if name.endswith("m.pgm"):
-        assert load_map(path)
-
-
-@pytest.mark.parametrize("name", ["deep/m.pgm", "{}/m.pgm", "../maps/m.pgm", "out/in/m.pgm"])
-def test_an_image_inside_the_map_directory_is_read(maps, name):
-    assert load_map(image_named(maps, name.format(maps)), map_directory=str(maps))
-
-
-@pytest.mark.parametrize("name", ["loop.yaml", "nul\0.yaml", "\ud800.wkt", "n" * 300 + ".yaml", "gone.yaml"])
-def test_no_possible_file_of_the_map_directory_is_refused(maps, name):
-    with pytest.raises(MapNotFound):
-        load_map(maps / name, map_directory=str(maps))
-
-
-@pytest.mark.parametrize("directory", ["/nowhere", "\0", "m.yaml"])
-def test_with_a_map_directory_that_is_none_nothing_is_read(maps, directory):
-    refusal(maps / "m.yaml", MapNotFound, map_directory=directory)
-
-
-def test_the_map_directory_may_be_in_the_home_directory_or_the_present_one(maps, monkeypatch):
-    monkeypatch.setenv("HOME", str(maps.parent))
-    monkeypatch.chdir(maps)
-    for directory in ("~/maps", ".", "../maps"):
-        assert load_map("~/maps/m.yaml", map_directory=directory)
-        assert load_map("m.yaml", map_directory=directory)
-        refusal(Path("../other/m.yaml"), MapNotFound, map_directory=directory)
 
 
 def test_polygon_files_may_be_as_long_as_the_cells_of_a_map_allow(tmp_path):
