@@ -71,6 +71,8 @@ def said_of(talk, way, pose, frame="map"):
         return talk.refused_start(pose, frame, way)
     if way == "goal_pose":
         talk.start(START)
+        # The start has come now: a megabyte right after it can push it out of the transport's buffer, to come seconds later.
+        assert talk.goal(START)["error_name"] == "NONE"
         return talk.goal(pose, frame)
     bad = PoseStamped(pose=pose)
     bad.header.frame_id = frame
@@ -135,6 +137,17 @@ def test_what_is_unusual_about_a_pose_is_warned_of_once(module_planners, talk, c
     warnings = [line for line in process.output.splitlines() if words in line]
     assert [line for line in warnings if "WARN" in line] == warnings
     assert len(warnings) == 2, "one for the start and one for the goal"
+
+
+def test_a_goal_without_a_rotation_is_taken_where_any_heading_will_do(talk):
+    talk.client.set_parameters(any_goal_heading=True)
+    try:
+        talk.start(START)
+        assert talk.goal(turned())["error_name"] == "NONE"
+        assert talk.plan(START, turned())[0]["error_name"] == "NONE"
+        assert_says(talk.plan(turned(), GOAL)[0], "212", "INVALID_POSE", "no rotation")
+    finally:
+        talk.client.set_parameters(any_goal_heading=False)
 
 
 def said_of_start(talk, way, start):
