@@ -39,6 +39,12 @@ def bare_pose(message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) ->
     return message
 
 
+def has_rotation(pose: PoseMessage) -> bool:
+    """Return False if the quaternion is all zero, as that of a pose is to which only a position was given."""
+    q = pose.orientation
+    return any((q.x, q.y, q.z, q.w))
+
+
 def pose_from(name: str, message: PoseMessage | PoseStamped | PoseWithCovarianceStamped) -> Pose:
     """Return the (x [m], y [m], yaw [rad]) of a pose, yaw in (-pi, pi]; its height and its tilt are ignored.
 

@@ -52,6 +52,11 @@ class Dispatcher:
         self._newest_id = 0
         self._under_way: dict[int, Submission] = {}
 
+    @property
+    def any_goal_heading(self) -> bool:
+        """True if goals may be reached with any heading."""
+        return bool(self._parameters.read().problem["any_goal_heading"])
+
     def new_id(self) -> int:
         """Return the plan_id of a new request."""
         self._newest_id += 1

@@ -9,7 +9,7 @@ from dubins_rrt_ros.planning import InvalidPose, Status
 from dubins_rrt_ros.planning.problem import Pose
 from dubins_rrt_ros.planning.text import quoted_name
 
-from .conversions import bare_pose, doubts_about, pose_from, transformed
+from .conversions import bare_pose, doubts_about, has_rotation, pose_from, transformed
 from .request import Refusal
 
 try:
@@ -29,13 +29,20 @@ class Frames:
             self._buffer = tf2_ros.Buffer()
             self._listener = tf2_ros.TransformListener(self._buffer, node)
 
-    def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped) -> Pose:
+    def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped, any_heading: bool = False) -> Pose:
         """Return the (x, y, yaw) of a message's pose in the global frame.
+
+        Args:
+            name: what the pose is, for messages.
+            message: a pose in any frame.
+            any_heading: True if its heading does not matter; then a quaternion of zeros is taken for no rotation.
 
         Raises:
             Refusal: it cannot be transformed, or is not a pose; `name` is in the message.
         """
         pose, frame = bare_pose(message), message.header.frame_id
+        if any_heading and not has_rotation(pose):
+            pose = PoseMessage(position=pose.position)  # whose w is 1
         if not frame:
             self._logger.warning(f"A {name} pose without frame_id is taken to be in '{self._frame}'", once=True)
         elif frame != self._frame:

@@ -83,7 +83,8 @@ class GoalSession:
         self._grace.cancel()
         with failures_reported(self._node, self._answer):
             world_map, start = self._readiness.require_map(), self._readiness.require_start()
-            request = self._dispatcher.request(self._plan_id, world_map, start, self._frames.pose("goal", self._goal))
+            goal = self._frames.pose("goal", self._goal, self._dispatcher.any_goal_heading)
+            request = self._dispatcher.request(self._plan_id, world_map, start, goal)
             if not request.world.done():
                 self._node.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
             self._submission = self._dispatcher.submit(self._dispatcher.goals, request, self._end, self._improve)

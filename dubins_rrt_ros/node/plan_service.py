@@ -41,7 +41,8 @@ class PlanService:
 
     def _plan_request(self, plan_id: int, request: GetPlan.Request) -> PlanRequest:
         world_map = self._readiness.require_map()
-        start, goal = self._frames.pose("start", request.start), self._frames.pose("goal", request.goal)
+        start = self._frames.pose("start", request.start)
+        goal = self._frames.pose("goal", request.goal, self._dispatcher.any_goal_heading)
         options = {} if request.tolerance == 0 else {"goal_tolerance_xy": request.tolerance}
         try:
             return self._dispatcher.request(plan_id, world_map, start, goal, **options)

@@ -99,3 +99,13 @@ def test_with_a_directory_that_is_not_there_no_map_is_loaded(limited, module_pla
     client = module_planners.client()
     assert load(client, str(folder / "maps/small.yaml")).result == LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
     client.wait_for_word(f"is outside of map_directory = {folder / 'nowhere'}")
+
+
+def test_the_home_directory_is_found_in_map_file_and_in_load_map(planners, folder, monkeypatch):
+    monkeypatch.setenv("HOME", str(folder))
+    process = planners.start(map_file="~/yard.yaml", map_directory="~/maps", **QUICK)
+    client = planners.client()
+    client.wait_for_word("Took a map of 100 x 100 cells: yard.yaml")
+    assert load(client, "~/maps/small.yaml").result == 0
+    assert load(client, "~/small.yaml").result != 0
+    assert process.running
