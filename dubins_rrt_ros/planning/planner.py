@@ -295,12 +295,15 @@ class _Call:
         """Return what was found, in a sentence."""
         so_far = " so far" if running else ""
         gap = gap_above(bound, path.length)
-        above = f", at most {100 * gap:.1f} % above the shortest possible" if math.isfinite(gap) else ""
+        least = "the Dubins curve without obstacles" if self._problem.vehicle.required_clearance < 0 else "the shortest possible"
+        above = f", at most {100 * gap:.1f} % above {least}" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
         before = f"{'cancelled ' if cancelled else ''}before the first sample"
         drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else before
         found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
         message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
+        if self._problem.vehicle.required_clearance < 0:
+            message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
         if self._problem.exact_goal:
             return message + "."
         off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)
