@@ -57,7 +57,7 @@ def _keep_freed_memory() -> None:
 
 
 def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable[[], bool] | None = None,
-         on_progress: Callable[[Progress], None] | None = None) -> Plan:
+         on_progress: Callable[[Progress], None] | None = None, report_samples: int = 0) -> Plan:
     """Plan a path from start to goal.
 
     The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short. The answer
@@ -68,11 +68,13 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
         settings: how to plan; the defaults where it is left out.
         cancel: called at once, when the world is ready, and about every 5 ms; True ends the search with the best path so far.
         on_progress: called with every better path, and every 50 ms.
+        report_samples: number of samples after which it is called too, each time that so many are drawn; 0 for the time alone.
 
     Returns:
         A Plan with an audited path, or with a status and a message that say why there is none.
     """
-    return _Call(problem, _with_seed(settings or Settings()), cancel or never, on_progress or _ignore).answer()
+    return _Call(problem, _with_seed(settings or Settings()), cancel or never, on_progress or _ignore,
+                 report_samples).answer()
 
 
 def _with_seed(settings: Settings) -> Settings:
@@ -100,7 +102,10 @@ class _Audited:
 class _Call:
     """One call of plan(), with its clock."""
 
-    def __init__(self, problem: Problem, settings: Settings, cancel: Callable[[], bool], on_progress: Callable[[Progress], None]):
+    def __init__(self, problem: Problem, settings: Settings, cancel: Callable[[], bool], on_progress: Callable[[Progress], None],
+                 report_samples: int):
+        self._report_samples = report_samples
+        self._samples_reported = 0
         self._problem, self._settings, self._on_progress = problem, settings, on_progress
         self._deadline = Deadline(settings.planning_time, cancel)
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
@@ -151,7 +156,8 @@ class _Call:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
         deadline = self._deadline
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
-        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline)
+        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
+                        self._report_samples)
         for may_end in () if deadline.is_due else search.run():
             if search.best >= 0 and self._time_to_found is None:
                 self._time_to_found = self._elapsed
@@ -165,13 +171,19 @@ class _Call:
     def _report(self, search: Search) -> None:
         """Report a better path, once it is shortened and audited, and the state of the search from time to time."""
         improved = search.ready and self._is_audit_due(search.cost) and self._is_right(search.path, search)
-        if improved or self._elapsed - self._last_report >= REPORT_INTERVAL:
-            self._tell(search.samples, improved, lambda: self._snapshot(search))
+        if improved or self._is_report_due(search.samples):
+            self._tell(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
 
-    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan]) -> None:
+    def _is_report_due(self, samples: int) -> bool:
+        by_samples = 0 < self._report_samples <= samples - self._samples_reported
+        return by_samples or self._elapsed - self._last_report >= REPORT_INTERVAL
+
+    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan], tree: Callable[[], Tree]) -> None:
         self._last_report = self._elapsed
+        if self._report_samples:
+            self._samples_reported = samples - samples % self._report_samples
         length = self._best.path.length if self._best else None
-        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot))
+        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot, tree))
 
     def _is_audit_due(self, cost: float) -> bool:
         """Return True if a path of this cost is better than the best that was audited, and the last audit is long enough ago."""
@@ -214,6 +226,8 @@ class _Call:
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
+        if search.bound:
+            self._bound = lower_bound(self._problem, search.bound)
         if self._best:
             return self._with_path(self._best, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
@@ -227,7 +241,7 @@ class _Call:
         before = self._best
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and (before is None or path_cost(self._best.path) < path_cost(before.path) - LEAST_IMPROVEMENT):
-            self._tell(answer.samples, True, lambda: answer)
+            self._tell(answer.samples, True, lambda: answer, lambda: answer.tree)
         return answer
 
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
