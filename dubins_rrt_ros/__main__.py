@@ -1,17 +1,8 @@
-"""The command `dubins_rrt`, which is `python -m dubins_rrt_ros` too. It imports nothing before Ctrl-C is heeded."""
+"""`python -m dubins_rrt_ros` is the command `dubins_rrt`."""
 
 import sys
 
-
-def main() -> int:
-    """Run the command line of the process, and return the exit status."""
-    try:
-        from dubins_rrt_ros.cli.main import main as run
-    except KeyboardInterrupt:
-        print("dubins_rrt: interrupted", file=sys.stderr)
-        return 130
-    return run()
-
+from dubins_rrt_ros.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

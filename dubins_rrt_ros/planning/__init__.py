@@ -9,8 +9,8 @@
 
 One verb, `plan(problem, settings)`, and its nouns: a `Problem` has a map (`load_map`, `GridMap`, `PolygonMap`), a `Vehicle`, a
 start and a goal; a `Plan` has an audited `Path` of Dubins curves, or a `Status` and a message that say why there is none, and the
-search `Tree`. `prepare` does once for many problems what depends on map and vehicle alone. Lengths are in metres, angles in
-radians, times in seconds. Errors that are raised on purpose derive from `PlanningError`.
+search `Tree`. `plan_through` plans over waypoints. `prepare` does once for many problems what depends on map and vehicle alone.
+Lengths are in metres, angles in radians, times in seconds. Errors that are raised on purpose derive from `PlanningError`.
 """
 
 import warnings
@@ -26,25 +26,25 @@ from .maps.files import load_map
 from .maps.grids import save_map
 from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, Thresholds, rasterise
 from .option import OptionError, options, values
-from .pictures import PictureError
 from .planner import plan
 from .problem import InvalidPose, Pose, Problem, checked_pose
 from .result import Plan, PlanError, Progress, Status
 from .search.tree import Tree, TreeError
 from .settings import Settings
 from .vehicle import Vehicle
+from .waypoints import plan_through
 from .world import World, prepare
 
 __all__ = [  # noqa: RUF022 - by what a user needs, in this order
     # what to plan, and how
-    "plan", "prepare", "Problem", "Settings", "Vehicle", "World", "load_map",
+    "plan", "plan_through", "prepare", "Problem", "Settings", "Vehicle", "World", "load_map",
     # what comes of it
     "Plan", "Progress", "Status", "Path", "DubinsCurve", "Tree", "Audit", "audit_path",
     # maps
     "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "Thresholds", "rasterise", "save_map",
     # errors
     "PlanningError", "CurveError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "PathError",
-    "PictureError", "PlanError", "TreeError",
+    "PlanError", "TreeError",
     # the rest
     "WORDS", "ClearanceField", "Pose", "checked_pose", "kernels_compiled", "options", "values",
 ]

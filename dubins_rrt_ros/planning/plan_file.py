@@ -11,7 +11,7 @@ from .curves.path import Path, PathError
 from .errors import PlanningError
 from .maps.model import Map
 from .option import is_number, options, values
-from .problem import Problem, checked_pose
+from .problem import Problem, Waypoint, checked_pose, checked_waypoint
 from .result import Plan
 from .settings import MAX_PLANNING_TIME, Settings
 from .text import quoted
@@ -41,6 +41,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
         "poses": plan.poses().tolist(),
+        **_waypoints_document(plan),
         "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
         "vehicle": values(problem.vehicle), "settings": values(problem) | values(settings), "version": __version__,
     }
@@ -49,6 +50,13 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
 def _number(value: float | None) -> float | None:
     """Return a float; None also for the infinite lower bound of an unreachable goal, which JSON cannot hold."""
     return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _waypoints_document(plan: Plan) -> dict[str, Any]:
+    """Return the waypoints as they were asked for, with null for a heading that is free, and where among the poses they are."""
+    if not plan.waypoints:
+        return {}
+    return {"waypoints": [list(waypoint) for waypoint in plan.waypoints], "waypoint_indices": list(plan.waypoint_indices)}
 
 
 def _curve_document(curve: DubinsCurve) -> dict[str, Any]:
@@ -75,6 +83,18 @@ def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, 
     fields = _known(Settings, fields, "settings")
     drawn = _field(document, "samples", int)
     return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"]})
+
+
+def read_waypoints(document: Mapping[str, Any]) -> tuple[Waypoint, ...]:
+    """Return the waypoints of the request that a document answers.
+
+    Raises:
+        PlanFileError: they are no list.
+        InvalidPose: one of them is no waypoint.
+    """
+    if "waypoints" not in document:
+        return ()
+    return tuple(checked_waypoint("waypoint", waypoint) for waypoint in _field(document, "waypoints", list))
 
 
 def read_path(document: Mapping[str, Any]) -> Path | None:

@@ -1,9 +1,9 @@
 """The request to the planner: map, vehicle, start, goal and what counts as reaching the goal."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from .errors import PlanningError
 from .maps.frame import LARGEST_YAW
@@ -13,6 +13,8 @@ from .text import quoted
 from .vehicle import Vehicle
 
 Pose = tuple[float, float, float]
+#: A pose to be passed, or a place, with None for the heading, that is passed with any.
+Waypoint = tuple[float, float, float | None]
 
 
 class InvalidPose(PlanningError, ValueError):
@@ -117,3 +119,16 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
         raise InvalidPose(f"The {name} pose has the yaw {numbers[2]:g} rad; give one within {LARGEST_YAW:g} rad of 0, "
                           "where rounding leaves its direction exact.")
     return numbers
+
+
+def checked_waypoint(name: str, waypoint: Any) -> Waypoint:
+    """Return a waypoint, (x, y, theta), or (x, y, None) or (x, y) where any heading will do.
+
+    Raises:
+        InvalidPose: as `checked_pose` does.
+    """
+    numbers = tuple(waypoint) if isinstance(waypoint, Iterable) else ()
+    if len(numbers) == 2 or (len(numbers) == 3 and numbers[2] is None):
+        x, y, _ = checked_pose(name, (*numbers[:2], 0.0))
+        return x, y, None
+    return checked_pose(name, waypoint)

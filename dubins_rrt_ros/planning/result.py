@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +13,11 @@ from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
 from .maps.model import GridMap
-from .pictures import Plottable, check_matplotlib
-from .problem import Pose, Problem
+from .problem import Pose, Problem, Waypoint
 from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Minimum distance between two poses of a path where the settings leave it to map and vehicle [m].
 MIN_FINE_SPACING = 0.01
@@ -51,7 +46,7 @@ class PlanError(PlanningError, ValueError):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(Plottable):
+class Plan:
     """The answer to a request; the tree is part of it, also on failure.
 
     Attributes:
@@ -68,9 +63,11 @@ class Plan(Plottable):
         planning_time: time from request to answer, the preparation of the map not counted [s].
         map_time: time for the preparation of the map, and for loading it where the caller added that [s].
         lower_bound: no path of the problem is shorter [m].
-        found_by: what found the path, before it was smoothed: hybrid_astar, rrt or rrt_star; "" without one, and where start and
-            goal are the same.
+        found_by: what found the path, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one, and
+            where nothing had to be searched.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
+        waypoints: the waypoints that the path was to pass, as they were asked for.
+        waypoint_indices: index among `poses` of each waypoint; empty without a path.
     """
 
     status: Status
@@ -89,6 +86,8 @@ class Plan(Plottable):
     lower_bound: float = 0.0
     found_by: str = ""
     audit: Audit | None = None
+    waypoints: tuple[Waypoint, ...] = ()
+    waypoint_indices: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
         return f"Plan({self.status.name}: {self.message})"
@@ -130,16 +129,6 @@ class Plan(Plottable):
     def gap(self) -> float | None:
         """The ratio length / lower_bound - 1: 0 for a path of length 0, infinite for a bound of 0, None without a path."""
         return None if self.path is None else gap_above(self.lower_bound, self.path.length)
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw map, tree, path and vehicle, or why there is no path, on axes or in a new pyplot figure, and return the axes.
-
-        Raises:
-            PictureError: matplotlib is not installed.
-        """
-        check_matplotlib()
-        from .pictures.plots import plot_plan
-        return plot_plan(self, ax)
 
     def check(self) -> None:
         """Check the invariants: those of the tree and of the path, and that all parts of the answer fit each other.
@@ -195,6 +184,8 @@ class Plan(Plottable):
             yield f"the first path came after {self.time_to_first} s of {self.planning_time} s"
         elif self.time_to_found is None or not 0 <= self.time_to_found <= self.time_to_first:
             yield f"the first path was found after {self.time_to_found} s, and ready after {self.time_to_first} s"
+        if len(self.waypoint_indices) != len(self.waypoints):
+            yield f"of {len(self.waypoints)} waypoints {len(self.waypoint_indices)} are on the path"
         if not self._is_in_tree(path):
             yield f"the path of {path.length} m to {path.end} is not in the tree of {len(self.tree)} nodes"
 
@@ -239,9 +230,7 @@ class Progress:
         elapsed: time since the request [s].
         length: length of the best path so far that is shortened and audited [m], or None.
         improved: True if this report was made because that path is new.
-        snapshot: a function that returns the Plan so far: with that path, and the tree of the moment when it was audited; call it
-            only before the callback returns.
-        tree: a function that returns the tree as it is now; likewise.
+        snapshot: a function that returns the Plan so far, with that path; call it only before the callback returns.
     """
 
     samples: int
@@ -249,4 +238,3 @@ class Progress:
     length: float | None
     improved: bool
     snapshot: Callable[[], Plan]
-    tree: Callable[[], Tree]

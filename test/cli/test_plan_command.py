@@ -199,7 +199,7 @@ def test_a_footprint_is_taken_as_nav2_writes_it(hall, capsys):
     (["--samples", "0"], "samples is 0"), (["--planner", "a_star"], "--planner"),
     (["--wheelbase", "1"], "max_steering_angle"), (["--start", "1", "2"], "--start"),
     (["--json", "."], "is a folder"),
-    (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.jpg"], "p.jpg"), (["--sampels", "3"], "--sampels")])
+    (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.gif"], "p.gif"), (["--sampels", "3"], "--sampels")])
 def test_wrong_usage_takes_one_line(hall, flags, names, capsys):
     assert names in refusal(hall, *REQUEST, *flags, capsys=capsys)
 
@@ -309,14 +309,39 @@ def test_ctrl_c_before_a_path_is_cancelled(hall):
     assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown
 
 
-def test_a_plot_may_be_an_animation_of_the_search(hall, capsys):
-    from PIL import Image
-    status, out, err = run(hall, *REQUEST, *BUDGET, "--paper", "--plot", "p.gif", capsys=capsys)
-    assert (status, err) == (0, "") and "Path of" in out
-    assert Image.open("p.gif").n_frames > 10
+VIA = ["--via", "-2", "3", "--via", "2", "3", "0"]
 
 
-def test_a_video_without_ffmpeg_is_refused_before_planning(hall, capsys, monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    assert "install the package ffmpeg" in refusal(hall, *REQUEST, "--plot", "p.mp4", capsys=capsys)
-    assert not Path("p.mp4").exists()
+def test_a_path_over_waypoints_is_written_planned_again_and_judged(hall, capsys):
+    status, out, error = run(hall, *REQUEST, *BUDGET, *VIA, "--json", "via.json", capsys=capsys)
+    assert (status, error) == (0, "") and "over 2 waypoints" in out
+    document = json.loads(Path("via.json").read_text())
+    assert document["waypoints"] == [[-2, 3, None], [2, 3, 0]]
+    passed = [document["poses"][index] for index in document["waypoint_indices"]]
+    assert passed[0][:2] == [-2, 3] and passed[1] == [2, 3, 0]
+    status, out, error = run("--replay", "via.json", "--json", "again.json", capsys=capsys)
+    assert (status, error) == (0, "")
+    assert json.loads(Path("again.json").read_text())["curves"] == document["curves"]
+    assert main(["audit", "via.json", hall]) == 0
+    assert "waypoint" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("change", "finding"), [
+    ({"waypoints": [[-2, 3.1, None], [2, 3, 0]]}, "the path does not pass waypoint 1 at (-2.000, 3.100)"),
+    ({"waypoint_indices": [0, 1]}, "waypoint_indices are [0, 1], which are not the poses at the waypoints"),
+    ({"waypoints": 5}, "waypoints are 5"),
+])
+def test_what_a_file_says_of_its_waypoints_is_judged(hall, change, finding, capsys):
+    run(hall, *REQUEST, *BUDGET, *VIA, "--json", "via.json", capsys=capsys)
+    Path("via.json").write_text(json.dumps(json.loads(Path("via.json").read_text()) | change))
+    assert main(["audit", "via.json", hall]) == 1
+    assert finding in capsys.readouterr().out
+
+
+def test_a_waypoint_of_one_number_is_refused(hall, capsys):
+    assert "--via has 1 number; give X Y or X Y YAW" in refusal(hall, *REQUEST, "--via", "1", capsys=capsys)
+
+
+def test_a_waypoint_that_is_not_reached_is_named(hall, capsys):
+    status, _, error = run(hall, *REQUEST, *BUDGET, "--via", "-0.5", "0", capsys=capsys)
+    assert status == 1 and error.startswith("206 GOAL_OCCUPIED: Waypoint 1 is occupied")

@@ -15,7 +15,8 @@ from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
-from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
+from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, read_waypoints
+from dubins_rrt_ros.planning.problem import Waypoint
 from dubins_rrt_ros.planning.text import one_line
 
 from .documents import read_json
@@ -34,6 +35,7 @@ class LoadedRequest(NamedTuple):
         load_time: time that reading the map took [s].
         source: the file of a plan that is planned again, or "".
         path: the path of that plan.
+        waypoints: what the path passes between start and goal.
     """
 
     map_name: str
@@ -42,6 +44,7 @@ class LoadedRequest(NamedTuple):
     load_time: float
     source: str = ""
     path: DrivenPath | None = None
+    waypoints: tuple[Waypoint, ...] = ()
 
 
 def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
@@ -105,10 +108,10 @@ def read_replay(file: str, **options: Any) -> LoadedRequest:
     world_map, load_time = _same_map(file, document, options)
     try:
         problem, settings = read_request(document, world_map)
-        path = read_path(document)
+        path, waypoints = read_path(document), read_waypoints(document)
     except PlanFileError as error:
         raise PlanFileError(f"{file}: {error}") from error
-    return LoadedRequest(document["map"], problem, settings, load_time, file, path)
+    return LoadedRequest(document["map"], problem, settings, load_time, file, path, waypoints)
 
 
 def _read_document(file: str) -> dict[str, Any]:

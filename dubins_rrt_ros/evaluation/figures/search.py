@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from dubins_rrt_ros.planning import ClearanceField, Path, Plan, Problem, Progress, Settings, plan
-from dubins_rrt_ros.planning.pictures.drawing import (
+from dubins_rrt_ros.cli.common.plots import (
     FAILURE,
     FREE,
     GOAL,
@@ -31,6 +30,7 @@ from dubins_rrt_ros.planning.pictures.drawing import (
     frame,
     planner_title,
 )
+from dubins_rrt_ros.planning import ClearanceField, Path, Plan, Problem, Progress, Settings, plan
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..option import is_number
+from ..problem import InvalidPose, checked_waypoint
 from ..text import quoted
 from .sweep import PRECISION, SHARE, Arcs
-from .verdict import TOLERANCE, Audit, driven_arcs
+from .verdict import TOLERANCE, Audit, driven_arcs, passing_findings
 
 if TYPE_CHECKING:
     from ..curves.path import Path
@@ -44,6 +45,7 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
             yield f"{name} is {quoted(document[name])}, and among the settings {quoted(settings.get(name))}"
     if map_id and "map_id" in document and document["map_id"] != map_id:
         yield f"map_id is {quoted(document['map_id'])}, and this map's is {map_id}: it was planned on another one"
+    yield from _waypoint_findings(document, path)
     length = path.length
     yield from _figure(document, "length", length, _ROUNDING * length)
     yield from _figure(document, "max_curvature", found.max_curvature, _ROUNDING * found.max_curvature)
@@ -56,7 +58,8 @@ def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()
 
     Of the lower bound it is judged that the path is not shorter, but not that there is no shorter one.
     """
-    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "max_curvature", "min_clearance", "gap", "poses"}
+    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "max_curvature", "min_clearance", "gap", "poses",
+              "waypoints", "waypoint_indices"}
     others = [name for name in document if name not in judged or name in passed_over]
     return ["lower_bound (that no path is shorter)" if name == "lower_bound" else name for name in others]
 
@@ -82,6 +85,21 @@ def pose_findings(poses: np.ndarray, path: "Path", spacing: float) -> list[str]:
 def _figure(document: Mapping[str, Any], name: str, value: float, tolerance: float) -> Iterator[str]:
     if name in document and not (is_number(document[name]) and abs(document[name] - value) <= tolerance):
         yield f"{name} is {quoted(document[name])}, and the path's is {value:.6g}"
+
+
+def _waypoint_findings(document: Mapping[str, Any], path: "Path") -> Iterator[str]:
+    """Yield a sentence for each waypoint that the path does not pass, or that is not where the document says."""
+    waypoints, indices = (document.get(name, []) for name in ("waypoints", "waypoint_indices"))
+    try:
+        passed = [checked_waypoint("waypoint", waypoint) for waypoint in waypoints]
+        poses = [document["poses"][index] for index in indices]
+    except (InvalidPose, TypeError, LookupError):
+        yield f"waypoints are {quoted(waypoints)}, and waypoint_indices {quoted(indices)}"
+        return
+    yield from passing_findings(path, passed)
+    if list(indices) != sorted(indices) or len(indices) != len(passed) or any(
+            not np.allclose(pose[:2], waypoint[:2], 0, TOLERANCE) for pose, waypoint in zip(poses, passed, strict=False)):
+        yield f"waypoint_indices are {quoted(indices)}, which are not the poses at the waypoints"
 
 
 def _bound_findings(document: Mapping[str, Any], length: float) -> Iterator[str]:

@@ -5,13 +5,14 @@ on clearance holds between samples too: `sweep.py` says how.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..problem import Pose, Problem
+from ..problem import Pose, Problem, Waypoint
 from .obstacles import Obstacles
 from .sweep import Arcs, any_time, clearance_findings
 
@@ -124,6 +125,20 @@ def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[
     if not findings and not (total_off <= CREEP + rounding and total_turned <= CREEP):
         findings.append(f"at its joints the path jumps by {total_off:.6g} m and {total_turned:.6g} rad in all")
     return findings
+
+
+def passing_findings(path: "Path", waypoints: Sequence[Waypoint]) -> Iterator[str]:
+    """Yield a sentence for the first waypoint that the path does not pass at a joint between two curves, in their order."""
+    joints = iter(path.waypoints.tolist())
+    for number, (x, y, theta) in enumerate(waypoints, 1):
+        for joint in joints:
+            off, turned = apart(joint, (x, y, joint[2] if theta is None else theta))
+            if off <= TOLERANCE and turned <= TOLERANCE:
+                joints = chain([joint], joints)  # where the next one may be, too
+                break
+        else:
+            yield f"the path does not pass waypoint {number} at ({x:.3f}, {y:.3f}) after those before it"
+            return
 
 
 def turn_findings(curves: Sequence["DubinsCurve"], problem: Problem) -> list[str]:

@@ -1,7 +1,6 @@
 """The search tree as a result: arrays, apart from those of the search."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +10,9 @@ from ..curves.angles import heading_error, position_error
 from ..curves.dubins import TURNS, DubinsCurve, poses_on
 from ..curves.path import Path
 from ..errors import PlanningError
-from ..pictures import Plottable, check_matplotlib
 from ..problem import Pose
 from ..vehicle import Vehicle
 from .cost import edge_costs
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class TreeError(PlanningError, AssertionError):
@@ -25,7 +20,7 @@ class TreeError(PlanningError, AssertionError):
 
 
 @dataclass(frozen=True, eq=False)
-class Tree(Plottable):
+class Tree:
     """Nodes and the edges from their parents. Node 0 is the start.
 
     Attributes:
@@ -55,6 +50,12 @@ class Tree(Plottable):
         """Return a tree of its root alone."""
         return cls(radius, np.array([root]), np.array([-1], np.int32), np.zeros(1), np.zeros(1, np.int8), np.zeros((1, 3)))
 
+    @classmethod
+    def of_path(cls, path: Path) -> "Tree":
+        """Return the tree of a path alone."""
+        costs = np.cumsum([0.0, *edge_costs(path.lengths[1:])])
+        return cls(path.radius, path.waypoints, np.arange(-1, len(costs) - 1, dtype=np.int32), costs, path.words, path.lengths)
+
     def __len__(self) -> int:
         return len(self.parents)
 
@@ -80,16 +81,6 @@ class Tree(Plottable):
         ends = [poses_on(self.poses, self.words, self.lengths, self.radius, self.parents[nodes], nodes,
                          begins[arc] + (nth + end) * piece)[:, :2] for end in (0, 1)]
         return np.stack(ends, axis=1)
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw all edges, on axes or in a new pyplot figure, and return the axes.
-
-        Raises:
-            PictureError: matplotlib is not installed.
-        """
-        check_matplotlib()
-        from ..pictures.plots import plot_tree
-        return plot_tree(self, ax)
 
     def check(self, field: ClearanceField | None = None, vehicle: Vehicle | None = None) -> None:
         """Check the invariants; with a field and a vehicle also that this touches no obstacle along any edge.

@@ -1,0 +1,135 @@
+"""The legs of a path over waypoints: the costs between all headings at their ends, and the cheapest chain of them.
+
+The cost of a leg between two headings is that of the shortest curve where that is free, and elsewhere that of the cheapest way
+onto a path of the leg that is known already, along it, and off it again. A curve that has not been checked counts as free, so
+that costs are lower bounds until they are decided; only those that a cheapest chain needs are, as in the lazy search of C. Dellin
+and S. Srinivasa, A unifying formalism for shortest path problems with expensive edge evaluations (2016).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .._kernels.junctions import check_curves
+from ..collision.clearance import ClearanceField
+from ..curves import dubins
+from ..curves.path import Path
+from ..deadline import never
+from ..problem import Pose
+from ..vehicle import Vehicle
+from .known_path import Junctions, KnownPath
+
+#: Maximum number of curves that are found blocked one by one before all of a leg that matter are checked.
+FEW = 16
+#: Number of parts in which these are checked; the time is looked at between them.
+SLICES = 16
+
+
+class _Known(NamedTuple):
+    """A known path of a leg, with the junctions for each heading at either end."""
+
+    path: KnownPath
+    onto: Junctions
+    off: Junctions
+
+
+class Leg:
+    """The way between two places, each with one heading or with several.
+
+    Attributes:
+        starts, ends: the poses there, one for each heading.
+        costs: (starts, ends) float64: the cheapest known costs [m], or lower bounds; infinite where no path is known.
+    """
+
+    def __init__(self, starts: Sequence[Pose], ends: Sequence[Pose], field: ClearanceField, vehicle: Vehicle):
+        self.starts, self.ends = starts, ends
+        self._field, self._vehicle = field, vehicle
+        self._checker = field.collision_checker(vehicle)
+        self._curves = dubins.lengths(np.array(starts)[:, None], np.array(ends)[None], vehicle.turning_radius)
+        self._is_free = np.zeros(self._curves.shape, bool)
+        self._over_known = np.full(self._curves.shape, math.inf)
+        self._known: list[_Known] = []
+        self._blocked = 0
+        self.costs = self._curves.copy()
+
+    @property
+    def has_obstacles(self) -> bool:
+        """True if a curve was found blocked."""
+        return self._blocked > 0
+
+    def is_curve(self, i: int, j: int) -> bool:
+        """Return True if the cheapest path between two headings is a single curve."""
+        return bool(self._curves[i, j] <= self._over_known[i, j])
+
+    def decide(self, i: int, j: int, interrupted: Callable[[], bool] = never) -> bool:
+        """Return True if the cost between two headings is certain; else it has become so now, and may have risen."""
+        if self._is_free[i, j] or not self.is_curve(i, j) or self.costs[i, j] == math.inf:
+            return True
+        self._check(np.array([[i, j]]))
+        if self._blocked > FEW:
+            for some in np.array_split(np.argwhere((self._curves < self._over_known) & ~self._is_free), SLICES):
+                self._check(some, may_be_free=not interrupted())
+        self.costs = np.minimum(self._curves, self._over_known)
+        return bool(self._is_free[i, j])
+
+    def add(self, path: Path) -> None:
+        """Take another path of this leg into account, between any headings."""
+        known = KnownPath(path, self._field, self._vehicle)
+        onto, off = known.onto(self.starts), known.off(self.ends)
+        over = onto.costs[:, None] + off.costs - known.cost
+        over[onto.indices[:, None] > off.indices] = math.inf
+        self._known.append(_Known(known, onto, off))
+        self._over_known = np.minimum(self._over_known, over)
+        self.costs = np.minimum(self._curves, self._over_known)
+
+    def path(self, i: int, j: int) -> Path:
+        """Return the cheapest path between two headings, whose cost is decided and finite."""
+        start, end = self.starts[i], self.ends[j]
+        if self.is_curve(i, j):
+            return Path.of_curves(start, end, [dubins.shortest(start, end, self._vehicle.turning_radius)])
+        over = [known.onto.costs[i] + known.off.costs[j] - known.path.cost if known.onto.indices[i] <= known.off.indices[j]
+                else math.inf for known in self._known]
+        known = self._known[int(np.argmin(over))]
+        return known.path.between(start, int(known.onto.indices[i]), end, int(known.off.indices[j]))
+
+    def _check(self, pairs: np.ndarray, may_be_free: bool = True) -> None:
+        """Check the curves between (n, 2) pairs of indices; they count as blocked where there is no time for that."""
+        free = np.zeros(len(pairs), np.uint8)
+        if may_be_free:
+            starts, ends = (np.array(poses)[pairs[:, k]] for k, poses in enumerate((self.starts, self.ends)))
+            check_curves(self._checker, starts, ends, self._vehicle.turning_radius, free)
+        is_free = free.astype(bool)
+        rows, columns = pairs.T
+        self._is_free[rows, columns] = is_free
+        self._curves[rows[~is_free], columns[~is_free]] = math.inf
+        self._blocked += int(np.count_nonzero(~is_free))
+
+
+def cheapest_chain(costs: Sequence[np.ndarray]) -> list[int]:
+    """Return the index of the heading at each place with which the legs are cheapest together, by dynamic programming.
+
+    Args:
+        costs: (headings at its start, headings at its end) of each leg; infinite where there is no path.
+    """
+    cost_to_come = np.zeros(len(costs[0]))
+    before = []
+    for leg in costs:
+        total = cost_to_come[:, None] + leg
+        before.append(np.argmin(total, axis=0))
+        cost_to_come = total.min(axis=0)
+    chain = [int(np.argmin(cost_to_come))]
+    for best in reversed(before):
+        chain.append(int(best[chain[-1]]))
+    return chain[::-1]
+
+
+def first_impassable(costs: Sequence[np.ndarray]) -> int | None:
+    """Return the first leg up to whose end no chain of finite cost leads, or None where one leads to the last end."""
+    cost_to_come = np.zeros(len(costs[0]))
+    for number, leg in enumerate(costs):
+        cost_to_come = (cost_to_come[:, None] + leg).min(axis=0)
+        if not np.isfinite(cost_to_come).any():
+            return number
+    return None

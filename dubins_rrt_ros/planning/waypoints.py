@@ -1,0 +1,354 @@
+"""plan_through(): one path over waypoints, whose free headings are chosen so that the whole is shortest.
+
+The headings are chosen by dynamic programming over HEADINGS of them at each waypoint; `search/legs.py` says what a leg costs
+between two. Where obstacles are in the way of a leg, paths of it are planned in several headings, then between the headings that
+were chosen, and the headings are chosen again until they stay. At last they are turned more finely, each leg is planned with its
+share of the samples, and the headings are turned once more.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._kernels import COMPILED
+from .audit.verdict import Audit, audit_path, passing_findings
+from .curves import dubins
+from .curves.angles import heading_error, position_error, wrap
+from .curves.path import Path
+from .deadline import Deadline, never
+from .planner import SAME, plan, with_seed
+from .problem import Pose, Problem, Waypoint, checked_waypoint
+from .result import Plan, Progress, Status
+from .search.cost_to_go import CostToGo
+from .search.hybrid_astar import HybridAStarRuns
+from .search.known_path import KnownPath
+from .search.legs import Leg, cheapest_chain, first_impassable
+from .search.smoothing import smooth
+from .search.tree import Tree
+from .settings import Settings
+from .world import World, prepare
+
+#: Number of headings that are tried at a waypoint.
+HEADINGS = 72
+#: Number of headings at either end with which a leg between obstacles is planned first.
+FIRST_HEADINGS = 4
+#: Maximum number of times that legs are planned between the headings that were chosen, and the headings chosen again.
+ROUNDS = 4
+#: Maximum number of poses that hybrid A* expands for such a path, and number in one step.
+DRAFT_EXPANSIONS, STEP = (8192, 512) if COMPILED else (512, 32)
+#: Angles to both sides by which headings are turned, one after the other [rad], and number of headings that are tried each time.
+TURNS, TRIES = (math.tau / HEADINGS, math.tau / HEADINGS / 8, math.tau / HEADINGS / 64), 33
+
+
+class _Stop(NamedTuple):
+    """A place that the path passes.
+
+    Attributes:
+        poses: one for each heading with which the vehicle may pass it.
+        waypoints: indices of the waypoints that are there; none at the start and at the goal, unless they are waypoints too.
+    """
+
+    poses: list[Pose]
+    waypoints: tuple[int, ...]
+
+
+def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], settings: Settings | None = None, *,
+                 cancel: Callable[[], bool] | None = None, on_progress: Callable[[Progress], None] | None = None) -> Plan:
+    """Plan a path from start to goal over waypoints, in their order.
+
+    Args:
+        problem: what to plan.
+        poses: the waypoints between start and goal: (x, y, theta); or (x, y, None) or (x, y), to be passed with any heading. One
+            that equals the one before, or the start, is passed there.
+        settings: as for `plan`; the legs share the samples.
+        cancel, on_progress: as for `plan`.
+
+    Returns:
+        A Plan with one audited path, whose `waypoint_indices` tell where it passes the waypoints; or with a message that names
+        the waypoint which is not reached.
+
+    Raises:
+        InvalidPose: a waypoint is none.
+    """
+    waypoints = tuple(checked_waypoint(f"waypoint {number}", pose) for number, pose in enumerate(poses, 1))
+    call = _Call(problem, waypoints, with_seed(settings or Settings()), cancel or never, on_progress)
+    return replace(call.answer(), waypoints=waypoints)
+
+
+class _Call:
+    """One call of plan_through(), with its clock."""
+
+    def __init__(self, problem: Problem, waypoints: tuple[Waypoint, ...], settings: Settings, cancel: Callable[[], bool],
+                 on_progress: Callable[[Progress], None] | None):
+        self._waypoints, self._settings, self._cancel, self._on_progress = waypoints, settings, cancel, on_progress
+        self._clock = Deadline(settings.planning_time, cancel)
+        world = problem.world
+        if not isinstance(world, World):
+            world = prepare(problem.map, problem.vehicle, problem.allow_unknown)
+        self._world, self._problem = world, replace(problem, world=world)
+        self._map_time = self._clock.elapsed
+        self._clock.restart()
+        self._samples = 0
+        self._found_by = ""
+        self._explored: set[int] = set()
+        self._rng = np.random.default_rng((settings.seed, 4))  # apart from those of the searches
+        self._failures: dict[int, Plan] = {}  # by the id of the leg
+        self._time_to_first: float | None = None
+
+    def answer(self) -> Plan:
+        """Choose the headings, plan the legs, and join them."""
+        stops = list(_stops(self._problem, self._waypoints))
+        if len(stops) < 3:
+            return self._single_leg(stops)
+        if unreachable := self._without_room(stops):
+            return unreachable
+        legs = [self._leg(here, there) for here, there in pairwise(stops)]
+        headings = self._chosen_headings(legs)
+        if headings is None:
+            return self._no_path(stops, legs)
+        paths = self._turned(stops, [leg.path(i, j) for leg, (i, j) in zip(legs, pairwise(headings), strict=True)])
+        first = self._joined(stops, paths)
+        if self._on_progress and first.path:
+            self._on_progress(Progress(first.samples, first.planning_time, first.length, True, lambda: first))
+        if self._settings.planner == "rrt" or self._clock.is_over:
+            return first
+        return self._joined(stops, self._turned(stops, self._planned(paths)))
+
+    def _single_leg(self, stops: list[_Stop]) -> Plan:
+        """Return the plan where all waypoints are at the start or at the goal."""
+        answer = plan(self._problem, self._settings, cancel=self._cancel, on_progress=self._on_progress)
+        ends = (0, len(answer.poses()) - 1)
+        indices = [end for stop, end in zip(stops, ends, strict=False) for _ in stop.waypoints]
+        return replace(answer, map_time=self._map_time, waypoint_indices=tuple(indices) if answer.path else ())
+
+    def _without_room(self, stops: list[_Stop]) -> Plan | None:
+        """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
+        for n, stop in enumerate(stops):
+            room = [pose for pose in stop.poses if self._world.field.pose_is_free(pose, self._problem.vehicle)]
+            if not room:
+                before, after = stops[max(n, 1) - 1:max(n, 1) + 1]
+                return self._no_way(after, self._leg_plan(self._leg(before, after)))
+            stops[n] = stop._replace(poses=room)
+        return None
+
+    def _leg(self, here: _Stop, there: _Stop) -> Leg:
+        return Leg(here.poses, there.poses, self._world.field, self._problem.vehicle)
+
+    # Headings
+
+    def _chosen_headings(self, legs: list[Leg]) -> list[int] | None:
+        """Return the index of a pose at each stop; None where no path is found over all of them."""
+        headings = self._cheapest_headings(legs)
+        for _ in range(ROUNDS):
+            if headings is None or self._clock.poll():
+                break
+            for leg, (i, j) in zip(legs, pairwise(headings), strict=True):
+                if not leg.is_curve(i, j):
+                    self._draft(leg, leg.starts[i], [leg.ends[j]])
+            before, headings = headings, self._cheapest_headings(legs)
+            if headings == before:
+                break
+        return headings
+
+    def _cheapest_headings(self, legs: list[Leg]) -> list[int] | None:
+        """Return the headings with which the legs are cheapest, as far as paths of them are known."""
+        while True:
+            headings = cheapest_chain([leg.costs for leg in legs])
+            ends = list(pairwise(headings))
+            unsure = [n for n, (leg, (i, j)) in enumerate(zip(legs, ends, strict=True)) if not leg.decide(i, j, self._clock.poll)]
+            if not unsure:
+                return headings if first_impassable([leg.costs for leg in legs]) is None else None
+            for n in unsure:
+                if legs[n].has_obstacles and n not in self._explored:
+                    self._explored.add(n)
+                    self._explore(legs[n])
+
+    def _explore(self, leg: Leg) -> None:
+        """Look for paths of a leg between several headings at its ends; where none is found so, plan it."""
+        to_end = CostToGo(self._world.field, self._problem.vehicle.inscribed_radius, leg.ends[0][:2])
+        starts, ends = (poses[::max(1, len(poses) // FIRST_HEADINGS)] for poses in (leg.starts, leg.ends))
+        pairs = [(start, leg.ends) for start in starts] + [(starts[0], [end]) for end in ends if len(ends) > 1]
+        drafts = [self._draft(leg, start, some, to_end) for start, some in pairs]
+        if not any(drafts) and not self._clock.poll():
+            found = self._leg_plan(leg)
+            if found.path:
+                leg.add(found.path)
+                self._found_by = found.found_by
+            self._failures[id(leg)] = found
+
+    def _draft(self, leg: Leg, start: Pose, ends: Sequence[Pose], to_end: CostToGo | None = None) -> bool:
+        """Add the path to the leg that hybrid A* finds with little work, from a start to one end or to any; return True if so."""
+        problem = Problem(self._world, start=start, goal=ends[0], any_goal_heading=len(ends) > 1)
+        field, vehicle = self._world.field, self._problem.vehicle
+        runs = HybridAStarRuns(problem, self._settings, field, to_end or CostToGo.to_goal(problem, field))
+        path, left = None, DRAFT_EXPANSIONS
+        while path is None and left > 0 and not runs.exhausted and not self._clock.poll():
+            path, left = runs.run(STEP, math.inf, self._clock.poll), left - STEP
+        if path is None:
+            return False
+        for first_round in (True, False):
+            path = smooth(path, vehicle, field, self._rng, first_round, self._clock.poll)
+        self._found_by = "hybrid_astar"
+        leg.add(path)
+        return True
+
+    def _leg_plan(self, leg: Leg) -> Plan:
+        """Plan a leg from its first start to its end."""
+        settings = replace(self._settings, samples=1, planner="rrt", planning_time=self._time(0.5))
+        problem = Problem(self._world, start=leg.starts[0], goal=leg.ends[0], any_goal_heading=len(leg.ends) > 1)
+        return plan(problem, settings, cancel=self._cancel)
+
+    def _time(self, share: float) -> float:
+        """Return a share of the time that is left, as a limit [s]."""
+        return max(0.001, share * self._clock.left)
+
+    # Legs
+
+    def _turned(self, stops: list[_Stop], paths: list[Path]) -> list[Path]:
+        """Turn the headings that can be chosen, each where that makes its two legs cheaper, and smooth the legs."""
+        for most in TURNS:
+            for n, stop in enumerate(stops[1:-1], 1):
+                if len(stop.poses) > 1 and not self._clock.poll():
+                    paths[n - 1:n + 1] = self._with_best_heading(paths[n - 1], paths[n], most)
+            if self._settings.shortcut:
+                paths = [self._smoothed(path) for path in paths]
+        return paths
+
+    def _smoothed(self, path: Path) -> Path:
+        if _is_shortest(path) or self._clock.is_over:
+            return path
+        return smooth(path, self._problem.vehicle, self._world.field, self._rng, False, self._clock.poll)
+
+    def _with_best_heading(self, before: Path, after: Path, most: float) -> list[Path]:
+        """Return two legs with the heading between them that makes them cheapest, of those up to `most` [rad] off the present."""
+        arriving, leaving = (KnownPath(path, self._world.field, self._problem.vehicle) for path in (before, after))
+        x, y, theta = after.start
+        poses = [(x, y, heading) for heading in wrap(theta + np.linspace(-most, most, TRIES)).tolist()]
+        off, onto = arriving.off(poses), leaving.onto(poses)
+        best = int(np.argmin(off.costs + onto.costs))
+        if not off.costs[best] + onto.costs[best] < arriving.cost + leaving.cost - SAME:
+            return [before, after]
+        return [arriving.from_start(poses[best], off.indices[best]), leaving.to_end(poses[best], onto.indices[best])]
+
+    def _planned(self, paths: list[Path]) -> list[Path]:
+        """Plan the legs that may become shorter, with equal shares of the samples, from the paths that are known."""
+        last = len(paths) - 1
+        some = [n for n, path in enumerate(paths) if not _is_shortest(path) or (n == last and not self._problem.exact_goal)]
+        for left, n in zip(range(len(some), 0, -1), some, strict=True):
+            if self._clock.poll():
+                break
+            problem = Problem(self._world, start=paths[n].start, goal=paths[n].end)
+            if n == last:
+                problem = replace(self._problem, start=paths[n].start)
+            settings = replace(self._settings, samples=max(1, self._settings.samples // len(some)),
+                               planning_time=self._time(0.9 / left))
+            found = plan(problem, settings, cancel=self._cancel, seed_path=paths[n])
+            self._samples += found.samples
+            if found.path and found.path.length < paths[n].length:
+                paths[n] = found.path
+        return paths
+
+    # Answers
+
+    def _joined(self, stops: list[_Stop], paths: list[Path]) -> Plan:
+        """Return the plan with the path of all legs, audited as a whole."""
+        path = Path.of_curves(self._problem.start, paths[-1].end, [curve for leg in paths for curve in leg.curves])
+        audit = audit_path(path, self._problem, self._world.obstacles)
+        audit = Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
+        if not audit.ok:
+            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
+            return self._plan(Status.UNKNOWN, message, Tree.of_path(path), audit=audit)
+        if self._time_to_first is None:
+            self._time_to_first = self._clock.elapsed
+        count = len(self._waypoints)
+        message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
+                   f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s.")
+        answer = self._plan(Status.NONE, message, Tree.of_path(path), path=path, audit=audit, samples=self._samples,
+                            lower_bound=min(self._lower_bound(), path.length), found_by=self._found_by,
+                            cancelled=self._clock.cancelled)
+        return replace(answer, waypoint_indices=tuple(_indices(stops, paths, answer.poses())))
+
+    def _lower_bound(self) -> float:
+        """Return a length that no path over the waypoints falls below [m]."""
+        problem = self._problem
+        goal = (*problem.goal[:2], problem.goal[2] if problem.yaw_tolerance == 0 else None)
+        bounds = [math.dist(here[:2], there[:2]) if here[2] is None or there[2] is None
+                  else dubins.shortest((*here[:2], here[2]), (*there[:2], there[2]), problem.vehicle.turning_radius).length
+                  for here, there in pairwise((problem.start, *self._waypoints, goal))]
+        return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
+
+    def _no_path(self, stops: list[_Stop], legs: list[Leg]) -> Plan:
+        """Return the plan without a path, with what is known of the first leg that has none."""
+        number = first_impassable([leg.costs for leg in legs]) or 0
+        return self._no_way(stops[number + 1], self._failures.get(id(legs[number])) or self._leg_plan(legs[number]))
+
+    def _no_way(self, stop: _Stop, found: Plan) -> Plan:
+        """Return the plan without a path that says which stop is not reached, and what was found instead of a path to it."""
+        root = Tree.of_root(self._problem.start, self._problem.vehicle.turning_radius)
+        if self._clock.poll() and self._clock.cancelled:
+            return self._plan(Status.CANCELLED, "Cancelled before a first path.", root, cancelled=True)
+        x, y, _ = stop.poses[0]
+        name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
+        status, why = found.status, f"On the way to {name} at ({x:.3f}, {y:.3f}): {found.message}"
+        if found.path:
+            status = Status.TIMEOUT
+            why = f"No path reaches {name} at ({x:.3f}, {y:.3f}) with a heading that leads on; allow more planning_time."
+        elif found.message.startswith("Start "):
+            why = found.message
+        elif found.message.startswith("Goal "):
+            why = found.message.replace("Goal", name[0].upper() + name[1:], 1)
+        return self._plan(status, why, root, location=found.location)
+
+    def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
+        first = self._time_to_first
+        return Plan(status, message, self._problem, self._settings, tree, time_to_first=first, time_to_found=first,
+                    planning_time=self._clock.elapsed, map_time=self._map_time, **more)
+
+
+def _stops(problem: Problem, waypoints: Sequence[Waypoint]) -> Iterator[_Stop]:
+    """Yield start, waypoints and goal; those at one place are one stop if one heading fits all."""
+    here: Waypoint = problem.start
+    indices: tuple[int, ...] = ()
+    goal = (*problem.goal[:2], None if problem.any_goal_heading else problem.goal[2])
+    for index, there in enumerate((*waypoints, goal)):
+        both = _common(here, there)
+        if both is None:
+            yield _Stop(_poses(here), indices)
+            indices = ()
+        here = both or there
+        indices = (*indices, index) if index < len(waypoints) else indices
+    yield _Stop(_poses(here), indices)
+
+
+def _common(here: Waypoint, there: Waypoint) -> Waypoint | None:
+    """Return the waypoint that is both at once, or None where they differ."""
+    (x, y, theta), (_, _, other) = here, there
+    if position_error((x, y, 0.0), (*there[:2], 0.0)) > SAME:
+        return None
+    if theta is None or other is None:
+        return x, y, other if theta is None else theta
+    return here if heading_error((x, y, theta), (x, y, other)) <= SAME else None
+
+
+def _poses(place: Waypoint) -> list[Pose]:
+    """Return the poses with which a waypoint may be passed."""
+    x, y, theta = place
+    headings = wrap(np.arange(HEADINGS) * (math.tau / HEADINGS)).tolist() if theta is None else [theta]
+    return [(x, y, heading) for heading in headings]
+
+
+def _is_shortest(path: Path) -> bool:
+    """Return True if no path between its ends is shorter."""
+    return len(path.curves) == 1 and path.length <= dubins.shortest(path.start, path.end, path.radius).length + SAME
+
+
+def _indices(stops: list[_Stop], paths: list[Path], poses: np.ndarray) -> Iterator[int]:
+    """Yield the index among the poses of a path at which it passes each waypoint."""
+    at, ends = 0, [paths[0].start, *(path.end for path in paths)]
+    for stop, end in zip(stops, ends, strict=True):
+        at += int(np.argmax((poses[at:] == end).all(axis=1)))
+        yield from [at] * len(stop.waypoints)

@@ -1,0 +1,196 @@
+"""Paths over waypoints: they pass them, and are as short as dynamic programming over many headings finds."""
+
+import math
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support.cases import needs_compiled, scaled
+from support.yard import GOAL, IN_THE_BOX, IN_THE_CHAMBER, START, yard
+
+from dubins_rrt_ros.planning import GridMap, InvalidPose, Problem, Settings, Status, Vehicle, plan, plan_through, prepare
+from dubins_rrt_ros.planning.audit import audit_path
+from dubins_rrt_ros.planning.audit.verdict import passing_findings
+from dubins_rrt_ros.planning.curves import dubins
+from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
+
+DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
+CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
+SETTINGS = Settings(samples=200, planning_time=120.0, seed=1)
+#: Free places of the yard, around its box.
+BELOW, ABOVE = (5.0, 3.0), (5.0, 7.0)
+
+
+@pytest.fixture(scope="module")
+def world():
+    return prepare(GridMap(yard(), 0.1), DISC)
+
+
+@pytest.fixture(scope="module")
+def plane():
+    return prepare(GridMap(np.zeros((100, 100), np.int8), 1.0), DISC)
+
+
+def through(world, *poses, start=START, goal=GOAL, settings=SETTINGS, **options):
+    answer = plan_through(Problem(world, start=start, goal=goal, **options), poses, settings)
+    answer.check()
+    return answer
+
+
+def assert_passed(answer, *poses):
+    """All waypoints are where the answer says, in their order, and the audit says so too."""
+    assert answer.solved, answer
+    found = answer.poses()
+    assert list(answer.waypoint_indices) == sorted(answer.waypoint_indices)
+    for index, (x, y, *heading) in zip(answer.waypoint_indices, poses, strict=True):
+        np.testing.assert_allclose(found[index, :2], (x, y), atol=1e-9)
+        if heading and heading[0] is not None:
+            assert abs(math.remainder(found[index, 2] - heading[0], math.tau)) < 1e-9
+    assert (np.hypot(*np.diff(found[:, :2], axis=0).T) > 0).all(), "a pose is there twice"
+    assert audit_path(answer.path, answer.problem) == answer.audit
+
+
+def by_dynamic_programming(places, start, goal, headings=72):
+    """The length of the shortest chain of Dubins curves over the places, with so many headings at each."""
+    grid = np.arange(headings) * math.tau / headings
+    stops = [np.array([start]), *(np.column_stack([np.tile(place, (headings, 1)), grid]) for place in places), np.array([goal])]
+    cost = np.zeros(1)
+    for here, there in pairwise(stops):
+        cost = (cost[:, None] + dubins.lengths(here[:, None], there[None], DISC.turning_radius)).min(axis=0)
+    return cost[0]
+
+
+def leg_by_leg(places, start, goal, headings=72):
+    """The same with the heading at each place that is best for the leg that leads there."""
+    grid, length = np.arange(headings) * math.tau / headings, 0.0
+    for place in places:
+        ends = np.column_stack([np.tile(place, (headings, 1)), grid])
+        lengths = dubins.lengths(np.array([start]), ends, DISC.turning_radius)
+        length, start = length + lengths.min(), tuple(ends[np.argmin(lengths)])
+    return length + dubins.shortest(start, goal, DISC.turning_radius).length
+
+
+def test_in_the_open_plane_the_whole_is_shortest(plane):
+    rng = np.random.default_rng(4)
+    shorter = differs = 0
+    for _ in range(scaled(30, least=1)):
+        places = 40 + rng.uniform(0, rng.choice([3.0, 6.0, 15.0]), (4, 2))
+        start, goal = (*places[0], rng.uniform(-3, 3)), (*places[3], rng.uniform(-3, 3))
+        answer = through(plane, *places[1:3], start=start, goal=goal)
+        assert_passed(answer, *places[1:3])
+        assert answer.length <= by_dynamic_programming(places[1:3], start, goal) * 1.0001
+        greedy = leg_by_leg(places[1:3], start, goal)
+        differs += greedy > answer.length * 1.0001
+        shorter += answer.length < greedy
+        assert answer.lower_bound <= answer.length
+    assert shorter >= 0.9 * differs
+
+
+@needs_compiled
+def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_legs(world):
+    headings = np.arange(8) * math.tau / 8
+    stops = [[START], [(*BELOW, heading) for heading in headings], [(*ABOVE, heading) for heading in headings], [GOAL]]
+    quick = Settings(planner="rrt", planning_time=0.1, seed=1)
+    cost = np.zeros(1)
+    for here, there in pairwise(stops):
+        legs = [[plan(Problem(world, start=start, goal=goal), quick).length or math.inf for goal in there] for start in here]
+        cost = (cost[:, None] + np.array(legs)).min(axis=0)
+    answer = through(world, BELOW, ABOVE)
+    assert_passed(answer, BELOW, ABOVE)
+    assert answer.length <= cost[0] * 1.005
+
+
+@pytest.mark.parametrize("vehicle", [DISC, CAR], ids=["disc", "car"])
+def test_headings_that_are_given_are_kept(vehicle):
+    yard_of = prepare(GridMap(yard(), 0.1), vehicle)
+    answer = through(yard_of, (*BELOW, 0.3), (*ABOVE, None), (*ABOVE, 2.0))
+    assert_passed(answer, (*BELOW, 0.3), ABOVE, (*ABOVE, 2.0))
+    assert answer.waypoint_indices[1] == answer.waypoint_indices[2]
+
+
+def test_waypoints_equal_to_each_other_to_the_start_or_to_the_goal_are_passed(world):
+    answer = through(world, START, START[:2], BELOW, BELOW, GOAL)
+    assert_passed(answer, START, START[:2], BELOW, BELOW, GOAL)
+    first, second, third, fourth, last = answer.waypoint_indices
+    assert (first, second, third, last) == (0, 0, fourth, len(answer.poses()) - 1)
+    assert through(world, START[:2], GOAL).path == plan(Problem(world, start=START, goal=GOAL), SETTINGS).path
+
+
+def test_without_waypoints_it_is_planned_as_ever(world):
+    assert through(world).path == plan(Problem(world, start=START, goal=GOAL), SETTINGS).path
+
+
+def test_a_waypoint_with_another_heading_at_the_start_is_driven_to(plane):
+    start = (50.0, 50.0, 0.0)
+    answer = through(plane, (50.0, 50.0, 1.0), start=start, goal=(60.0, 50.0, 0.0))
+    assert_passed(answer, (50.0, 50.0, 1.0))
+    assert answer.waypoint_indices[0] > 0
+
+
+def test_the_goal_may_have_any_heading(plane):
+    start, goal = (50.0, 50.0, 0.0), (50.0, 56.0, 0.0)
+    free = through(plane, (55.0, 53.0), start=start, goal=goal, any_goal_heading=True)
+    assert_passed(free, (55.0, 53.0))
+    assert free.length < through(plane, (55.0, 53.0), start=start, goal=goal).length - 0.5
+
+
+@pytest.mark.parametrize(("place", "status", "words"), [
+    (IN_THE_BOX[:2], Status.GOAL_OCCUPIED, "Waypoint 2 is occupied: clearance 0.00 m"),
+    (IN_THE_CHAMBER[:2], Status.NO_VALID_PATH, r"On the way to waypoint 2 at \(9.000, 9.000\): No path exists"),
+    ((20.0, 5.0), Status.GOAL_OUTSIDE_MAP, r"Waypoint 2 \(20, 5\) is 10.00 m outside the map"),
+])
+def test_a_leg_that_fails_names_its_waypoint(world, place, status, words):
+    answer = through(world, BELOW, place, ABOVE)
+    assert (answer.status, answer.path, answer.waypoint_indices) == (status, None, ())
+    assert re.match(words, answer.message), answer.message
+    assert answer.waypoints == ((*BELOW, None), (*place, None), (*ABOVE, None))
+
+
+def test_a_start_that_is_occupied_is_named(world):
+    answer = through(world, BELOW, ABOVE, start=IN_THE_BOX)
+    assert answer.status == Status.START_OCCUPIED
+    assert answer.message.startswith("Start is occupied")
+
+
+@pytest.mark.parametrize("pose", [(1.0,), (1.0, math.nan), (1.0, 2.0, 3.0, 4.0), None, "ab", (1.0, None)])
+def test_what_is_no_waypoint_is_refused(world, pose):
+    with pytest.raises(InvalidPose, match="waypoint 2"):
+        through(world, BELOW, pose)
+
+
+def test_the_same_seed_gives_the_same_path(world):
+    assert through(world, BELOW, ABOVE).path == through(world, BELOW, ABOVE).path
+
+
+def test_a_cancelled_request_has_no_path(world):
+    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, cancel=lambda: True)
+    answer.check()
+    assert answer.status == Status.CANCELLED or answer.cancelled
+
+
+def test_the_first_path_is_reported(world):
+    reports = []
+    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, on_progress=reports.append)
+    first = reports[0].snapshot()
+    assert reports[0].improved
+    assert first.audit.ok
+    assert first.length >= answer.length - 1e-6
+
+
+def test_the_audit_finds_a_waypoint_that_is_not_passed(world):
+    path = through(world, BELOW, ABOVE).path
+    assert not list(passing_findings(path, [(*BELOW, None), (*BELOW, None), (*ABOVE, None)]))
+    for wrong in ([(*ABOVE, None), (*BELOW, None)], [(5.0, 3.001, None)], [(*BELOW, 9.0)]):
+        assert "does not pass waypoint" in next(passing_findings(path, wrong))
+
+
+def test_the_cheapest_chain_is_that_of_all_chains():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        costs = [rng.uniform(1, 2, shape) for shape in ((1, 4), (4, 3), (3, 4))]
+        costs[1][rng.integers(4), :] = math.inf
+        i, j, k = min(np.ndindex(4, 3, 4), key=lambda chain: costs[0][0, chain[0]] + costs[1][chain[:2]] + costs[2][chain[1:]])
+        assert cheapest_chain(costs) == [0, i, j, k]
+        assert first_impassable(costs) is None
+        assert first_impassable([costs[0], np.full((4, 3), math.inf), costs[2]]) == 1
