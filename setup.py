@@ -65,7 +65,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.__main__:main",
-            f"dubins_rrt = {PACKAGE}.cli.main:main",
+            f"dubins_rrt = {PACKAGE}.__main__:main",
         ],
     },
     zip_safe=False,

@@ -44,5 +44,16 @@ def test_the_installed_command_plans_on_an_installed_map(prefix, tmp_path):
     assert "Path of" in done.stdout
 
 
+@pytest.mark.skipif(not (Path(sys.prefix) / INDEX).exists(), reason="not installed by pip")
+def test_the_launchers_in_lib_find_their_own_interpreter(tmp_path):
+    """So that `ros2 run` and the demonstration find it whose prefix is in AMENT_PREFIX_PATH, without its bin on the PATH."""
+    environment = {"PATH": os.defpath, "HOME": str(tmp_path), "AMENT_PREFIX_PATH": sys.prefix}
+    (tmp_path / "dubins_rrt").symlink_to(Path(sys.prefix) / "lib" / "dubins_rrt_ros" / "dubins_rrt")
+    for command in (tmp_path / "dubins_rrt", Path(sys.prefix) / "lib" / "dubins_rrt_ros" / "planner"):
+        done = subprocess.run([command, "--help"], cwd=tmp_path, capture_output=True, text=True, timeout=120, env=environment)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.startswith("usage: ")
+
+
 def test_the_version_is_that_of_package_xml(prefix):
     assert f"<version>{dubins_rrt_ros.__version__}</version>" in (prefix / "share/dubins_rrt_ros/package.xml").read_text()

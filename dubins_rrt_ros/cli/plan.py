@@ -18,7 +18,7 @@ from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.example import ENDS, EXAMPLE, MAP
 from .common.flags import add_option_flags, add_paper_flag, flag, given_options, given_settings
-from .common.output import check_drawing, check_folder, words_for, write_csv, write_json
+from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
 from .common.request import MAP_FLAGS, LoadedRequest, add_map_arguments, map_options, read_map, read_replay
@@ -63,7 +63,8 @@ def add_arguments(parser: Parser) -> None:
                         help="take the yaws of --start, --via and --goal in degrees; what is written stays in radians")
     add_json_flag(parser, "the plan, also without a path,")
     parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x,y,theta")
-    parser.add_argument("--plot", metavar="FILE", help="draw map, tree and path; .png, .svg or .pdf")
+    parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
+                                                         f"search ({', '.join(ANIMATIONS)})")
     parser.add_argument("--replay", metavar="FILE", action=_Replay, contained=required,
                         help="plan the request of a file that --json wrote again, in place of all other options: with "
                              "its seed and as many samples as it drew, and no time limit, so that the path is the same")
@@ -75,16 +76,19 @@ def add_arguments(parser: Parser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Plan, report, write the files, and return the exit status."""
     check_folder(arguments.json, arguments.csv, arguments.plot)
-    check_drawing(arguments.plot)
+    check_drawing(arguments.plot, DRAWINGS + ANIMATIONS)
     request = _request(arguments)
-    with _interrupt() as cancel, _shown_progress(request.settings) as on_progress:
+    watch = _Watch(request.settings, is_animation(arguments.plot))
+    with _interrupt() as cancel, watch.shown() as on_progress:
         if request.waypoints:
             answer = plan_through(request.problem, request.waypoints, request.settings, cancel=cancel, on_progress=on_progress)
         else:
-            answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
+            answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress, report_samples=watch.samples)
     answer = replace(answer, map_time=answer.map_time + request.load_time)
     _report(answer, request, words_for(arguments.json))
     _write(answer, request.map_name, arguments)
+    if arguments.plot:
+        watch.draw(arguments.plot, answer)
     return 0 if answer.path else 1
 
 
@@ -144,16 +148,39 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-@contextlib.contextmanager
-def _shown_progress(settings: Settings) -> Iterator[Callable[[Progress], None]]:
-    """Show on a terminal how many samples are drawn, with the best length and the time limit."""
-    limit = f"limit {settings.planning_time:g} s"
-    with progress_bar(settings.samples, " samples", limit) as move:
-        def show(progress: Progress) -> None:
-            best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
-            move(progress.samples, f"{best}, {limit}")
+class _Watch:
+    """What follows a search: a bar on a terminal, and a recording where it is to be an animation."""
 
-        yield show
+    def __init__(self, settings: Settings, is_animation: bool):
+        self._settings, self._recording = settings, None
+        #: Number of samples from one frame to the next, 0 without an animation.
+        self.samples = 0
+        if is_animation:
+            from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
+            self.samples = max(1, settings.samples // MOST_FRAMES)
+            self._recording = Recording(self.samples)
+
+    @contextlib.contextmanager
+    def shown(self) -> Iterator[Callable[[Progress], None]]:
+        """Show on a terminal how many samples are drawn, with the best length and the time limit."""
+        limit = f"limit {self._settings.planning_time:g} s"
+        with progress_bar(self._settings.samples, " samples", limit) as move:
+            def show(progress: Progress) -> None:
+                best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
+                move(progress.samples, f"{best}, {limit}")
+                if self._recording:
+                    self._recording(progress)
+
+            yield show
+
+    def draw(self, file: str, answer: Plan) -> None:
+        """Draw the answer, or the search."""
+        if self._recording is None:
+            from dubins_rrt_ros.planning.pictures.drawing import draw_plan  # here, since matplotlib takes longer than most plans
+            draw_plan(file, answer)
+            return
+        with progress_bar(self._recording.frames, " frames") as move:
+            self._recording.save(file, answer, lambda done: move(done, ""))
 
 
 def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:
@@ -161,9 +188,6 @@ def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:
         write_json(arguments.json, answer, map_name)
     if arguments.csv:
         write_csv(arguments.csv, answer)
-    if arguments.plot:
-        from .common.plots import draw_plan  # here, for matplotlib takes longer to import than most plans to make
-        draw_plan(arguments.plot, answer)
 
 
 def _report(answer: Plan, request: LoadedRequest, out: TextIO) -> None:

@@ -10,8 +10,10 @@ def main() -> int:
         print("planner: ROS 2 is not here (no module rclpy); source its setup file, or run: pip install 'dubins_rrt_ros[ros]'",
               file=sys.stderr)
         return 1
-    from .main import main as run
-
+    try:
+        from .main import main as run
+    except KeyboardInterrupt:  # which ends a node regularly, also while it is imported
+        return 0
     return run()
 
 

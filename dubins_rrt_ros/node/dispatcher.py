@@ -48,7 +48,8 @@ class Dispatcher:
 
     def __init__(self, node: Node, parameters: Parameters, maps: Maps, queue: ExecutorQueue):
         self._node, self._parameters, self._maps, self._queue = node, parameters, maps, queue
-        self.goals, self.services = Worker("goals"), Worker("services")
+        self._workers: list[Worker] = []
+        self.goals, self.services = self.new_worker("goals"), self.new_worker("services")
         self._newest_id = 0
         self._under_way: dict[int, Submission] = {}
 
@@ -56,6 +57,11 @@ class Dispatcher:
     def any_goal_heading(self) -> bool:
         """True if goals may be reached with any heading."""
         return bool(self._parameters.read().problem["any_goal_heading"])
+
+    def new_worker(self, name: str) -> Worker:
+        """Return one more worker, which neither waits for the others nor keeps them waiting."""
+        self._workers.append(Worker(name))
+        return self._workers[-1]
 
     def new_id(self) -> int:
         """Return the plan_id of a new request."""
@@ -84,7 +90,7 @@ class Dispatcher:
         """Have a worker serve a request after what it was given before.
 
         Args:
-            worker: `goals` or `services`.
+            worker: `goals`, `services` or one of `new_worker`.
             request: what to plan.
             on_end: called once.
             on_improvement: called for the better paths meanwhile.
@@ -105,13 +111,13 @@ class Dispatcher:
 
     def cancel_all(self) -> list[Submission]:
         """Cancel all requests and return them; each still has an outcome."""
-        self.goals.cancel_all()
-        self.services.cancel_all()
+        for worker in self._workers:
+            worker.cancel_all()
         return list(self._under_way.values())
 
     def close(self) -> None:
         """Cancel all requests and end the workers."""
-        for worker in (self.goals, self.services):
+        for worker in self._workers:
             worker.close(SHUTDOWN_TIMEOUT)
 
 

@@ -60,7 +60,7 @@ class Maps:
         self._came_by_topic = False
         self._worker = Worker("maps")
         self._world: futures.Future[World] = futures.Future()  # of the newest map
-        self._world_is_of: tuple[Map, float, bool] | None = None  # map, inscribed radius and allow_unknown
+        self._world_is_of: tuple[Map, float, bool] | None = None  # map, required clearance and allow_unknown
         self._world_is_wanted = False  # by a request, whatever map comes next
         self._last_world: World | None = None  # that was prepared; the worker's own
         self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED) if self._options.map_file else None
@@ -93,7 +93,7 @@ class Maps:
         if self.map is not None:
             now = self._parameters.read()
             allow_unknown = now.problem["allow_unknown"]
-            wanted = self.map, now.vehicle.inscribed_radius, allow_unknown
+            wanted = self.map, now.vehicle.required_clearance, allow_unknown
             if self._world_is_of != wanted:
                 self._renew_world()
                 self._world_is_of = wanted

@@ -33,7 +33,9 @@ FINAL_TREE = 10_000
 
 
 class Outputs:
-    """The node's publishers, but for the map's, and its log of events. Only the executor's thread may use them, but for `path`.
+    """The node's publishers, but for the map's, and its log of events.
+
+    Only the executor's thread may use them, but for `path` and `serialized`.
 
     Attributes:
         shown: the plan whose path and tree are on display, if there is one.
@@ -82,6 +84,14 @@ class Outputs:
         """Return the path of a plan as a message, empty where there is none; any thread may ask for it."""
         return path_message(poses_of(plan), self._frame, self._now())
 
+    def serialized(self, plan: Plan | None, stamp: Time) -> bytes:
+        """Return the path of a plan as it is published; any thread may ask for it."""
+        return serialized_path(poses_of(plan), self._frame, stamp)
+
+    def publish_path(self, path: bytes) -> None:
+        """Publish the path of a request that is not the goal's, of which nothing else is on display."""
+        self._path.publish(path)
+
     def report(self, outcome: Outcome, *, log: bool = True, request: str = "", plan_id: int = 0, revision: int = 0,
                map_id: str = "", stamp: Time | None = None) -> None:
         """Publish an event as status.
@@ -102,7 +112,7 @@ class Outputs:
 
     def _show_path(self, plan: Plan | None) -> Time:
         self.shown, stamp = plan, self._now()
-        self._path.publish(serialized_path(poses_of(plan), self._frame, stamp))
+        self._path.publish(self.serialized(plan, stamp))
         return stamp
 
     def _log(self, event: DiagnosticStatus) -> None:

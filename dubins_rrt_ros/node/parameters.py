@@ -37,6 +37,7 @@ class NodeOptions:
     publish_tree: bool = option(True, "publish the tree on ~/tree while somebody subscribes")
     replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
                                                "is no longer free")
+    planner_ids: tuple[str, ...] = option(("GridBased",), "names by which Nav2's actions may ask for this planner")
     check_invariants: bool = option(False, "for debugging: check the invariants of every answer, its path and its tree before "
                                            "it is published, which is slow")
 

@@ -26,6 +26,7 @@ from .maps.files import load_map
 from .maps.grids import save_map
 from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, Thresholds, rasterise
 from .option import OptionError, options, values
+from .pictures import PictureError
 from .planner import plan
 from .problem import InvalidPose, Pose, Problem, checked_pose
 from .result import Plan, PlanError, Progress, Status
@@ -44,7 +45,7 @@ __all__ = [  # noqa: RUF022 - by what a user needs, in this order
     "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "Thresholds", "rasterise", "save_map",
     # errors
     "PlanningError", "CurveError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "PathError",
-    "PlanError", "TreeError",
+    "PictureError", "PlanError", "TreeError",
     # the rest
     "WORDS", "ClearanceField", "Pose", "checked_pose", "kernels_compiled", "options", "values",
 ]

@@ -68,12 +68,16 @@ class Option(NamedTuple):
             return "true or false"
         if self.type is str:
             return "text"
+        if self.type is list:
+            return "a list of texts"
         if self.type is int:
             return f"an integer from {self.low} to {self.high}"
         return f"a number from {self.low:g} to {self.high:g}"
 
     def convert(self, value: Any) -> Any:
         """Return `value` as the field holds it; an int is taken where a float is due, and a NumPy number as Python's own.
+
+        A list of texts is held as a tuple.
 
         Raises:
             OptionError: the value is of another type, not finite or out of range.
@@ -83,9 +87,13 @@ class Option(NamedTuple):
         value = plain_number(value)
         if not self._takes(value):
             raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}")
+        if self.type is list:
+            return tuple(value)
         return float(value) if self.type is float else value
 
     def _takes(self, value: Any) -> bool:
+        if self.type is list:
+            return isinstance(value, list | tuple) and all(isinstance(item, str) for item in value)
         if not (type(value) is self.type or (self.type, type(value)) == (float, int)):
             return False
         if self.low is not None and self.high is not None:
@@ -108,6 +116,8 @@ def options(cls: type) -> tuple[Option, ...]:
 def _option_of(field: "dataclasses.Field[Any]") -> Option:
     form = field.metadata["text_form"]
     default = form.write(field.default) if form else field.default
+    if isinstance(default, tuple):
+        default = list(default)
     return Option(name=field.name, type=type(default), default=default, **field.metadata)
 
 

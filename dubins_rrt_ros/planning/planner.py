@@ -58,7 +58,7 @@ def _keep_freed_memory() -> None:
 
 
 def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable[[], bool] | None = None,
-         on_progress: Callable[[Progress], None] | None = None, seed_path: Path | None = None) -> Plan:
+         on_progress: Callable[[Progress], None] | None = None, report_samples: int = 0, seed_path: Path | None = None) -> Plan:
     """Plan a path from start to goal.
 
     The same seed and sample budget give the same path; the time limit and a cancellation only cut the search short. The answer
@@ -69,13 +69,15 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
         settings: how to plan; the defaults where it is left out.
         cancel: called at once, when the world is ready, and about every 5 ms; True ends the search with the best path so far.
         on_progress: called with every better path, and every 50 ms.
+        report_samples: number of samples after which it is called too, each time that so many are drawn; 0 for the time alone.
         seed_path: a path of a similar problem, such as the last one; what of it is free and leads from here to the goal is the
             first path, which the search goes on from. The path that is planned depends on it.
 
     Returns:
         A Plan with an audited path, or with a status and a message that say why there is none.
     """
-    return _Call(problem, with_seed(settings or Settings()), cancel or never, on_progress or _ignore, seed_path).answer()
+    return _Call(problem, with_seed(settings or Settings()), cancel or never, on_progress or _ignore, report_samples,
+                 seed_path).answer()
 
 
 def with_seed(settings: Settings) -> Settings:
@@ -104,7 +106,9 @@ class _Call:
     """One call of plan(), with its clock."""
 
     def __init__(self, problem: Problem, settings: Settings, cancel: Callable[[], bool], on_progress: Callable[[Progress], None],
-                 seed_path: Path | None = None):
+                 report_samples: int = 0, seed_path: Path | None = None):
+        self._report_samples = report_samples
+        self._samples_reported = 0
         self._problem, self._settings, self._on_progress, self._seed_path = problem, settings, on_progress, seed_path
         self._deadline = Deadline(settings.planning_time, cancel)
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
@@ -156,7 +160,7 @@ class _Call:
         deadline = self._deadline
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
-                        self._usable_seed(field))
+                        self._report_samples, self._usable_seed(field))
         for may_end in () if deadline.is_due else search.run():
             if search.best >= 0 and self._time_to_found is None:
                 self._time_to_found = self._elapsed
@@ -178,13 +182,19 @@ class _Call:
     def _report(self, search: Search) -> None:
         """Report a better path, once it is shortened and audited, and the state of the search from time to time."""
         improved = search.ready and self._is_audit_due(search.cost) and self._is_right(search.path, search)
-        if improved or self._elapsed - self._last_report >= REPORT_INTERVAL:
-            self._tell(search.samples, improved, lambda: self._snapshot(search))
+        if improved or self._is_report_due(search.samples):
+            self._tell(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
 
-    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan]) -> None:
+    def _is_report_due(self, samples: int) -> bool:
+        by_samples = 0 < self._report_samples <= samples - self._samples_reported
+        return by_samples or self._elapsed - self._last_report >= REPORT_INTERVAL
+
+    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan], tree: Callable[[], Tree]) -> None:
         self._last_report = self._elapsed
+        if self._report_samples:
+            self._samples_reported = samples - samples % self._report_samples
         length = self._best.path.length if self._best else None
-        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot))
+        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot, tree))
 
     def _is_audit_due(self, cost: float) -> bool:
         """Return True if a path of this cost is better than the best that was audited, and the last audit is long enough ago."""
@@ -227,6 +237,8 @@ class _Call:
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
+        if search.bound:
+            self._bound = lower_bound(self._problem, search.bound)
         if self._best:
             return self._with_path(self._best, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
@@ -240,7 +252,7 @@ class _Call:
         before = self._best
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and (before is None or path_cost(self._best.path) < path_cost(before.path) - LEAST_IMPROVEMENT):
-            self._tell(answer.samples, True, lambda: answer)
+            self._tell(answer.samples, True, lambda: answer, lambda: answer.tree)
         return answer
 
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
@@ -308,12 +320,15 @@ class _Call:
         """Return what was found, in a sentence."""
         so_far = " so far" if running else ""
         gap = gap_above(bound, path.length)
-        above = f", at most {100 * gap:.1f} % above the shortest possible" if math.isfinite(gap) else ""
+        least = "the Dubins curve without obstacles" if self._problem.vehicle.required_clearance < 0 else "the shortest possible"
+        above = f", at most {100 * gap:.1f} % above {least}" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
         before = f"{'cancelled ' if cancelled else ''}before the first sample"
         drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else before
         found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
         message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
+        if self._problem.vehicle.required_clearance < 0:
+            message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
         if self._problem.exact_goal:
             return message + "."
         off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
 from .maps.model import GridMap
+from .pictures import Plottable, check_matplotlib
 from .problem import Pose, Problem, Waypoint
 from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Minimum distance between two poses of a path where the settings leave it to map and vehicle [m].
 MIN_FINE_SPACING = 0.01
@@ -46,7 +51,7 @@ class PlanError(PlanningError, ValueError):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan:
+class Plan(Plottable):
     """The answer to a request; the tree is part of it, also on failure.
 
     Attributes:
@@ -129,6 +134,16 @@ class Plan:
     def gap(self) -> float | None:
         """The ratio length / lower_bound - 1: 0 for a path of length 0, infinite for a bound of 0, None without a path."""
         return None if self.path is None else gap_above(self.lower_bound, self.path.length)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw map, tree, path and vehicle, or why there is no path, on axes or in a new pyplot figure, and return the axes.
+
+        Raises:
+            PictureError: matplotlib is not installed.
+        """
+        check_matplotlib()
+        from .pictures.plots import plot_plan
+        return plot_plan(self, ax)
 
     def check(self) -> None:
         """Check the invariants: those of the tree and of the path, and that all parts of the answer fit each other.
@@ -230,7 +245,9 @@ class Progress:
         elapsed: time since the request [s].
         length: length of the best path so far that is shortened and audited [m], or None.
         improved: True if this report was made because that path is new.
-        snapshot: a function that returns the Plan so far, with that path; call it only before the callback returns.
+        snapshot: a function that returns the Plan so far: with that path, and the tree of the moment when it was audited; call it
+            only before the callback returns.
+        tree: a function that returns the tree as it is now; likewise.
     """
 
     samples: int
@@ -238,3 +255,4 @@ class Progress:
     length: float | None
     improved: bool
     snapshot: Callable[[], Plan]
+    tree: Callable[[], Tree]

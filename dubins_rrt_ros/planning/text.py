@@ -80,3 +80,8 @@ class _Short(reprlib.Repr):
 
 
 _SHORT = _Short()
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra of this package."""
+    return f"pip install 'dubins_rrt_ros[{extra}]'"

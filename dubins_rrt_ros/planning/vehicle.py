@@ -16,7 +16,7 @@ from .text import quoted
 
 #: A point (x, y) [m].
 Point = tuple[float, float]
-#: The corners of a polygon around the reference point, in the vehicle's frame.
+#: The corners of a polygon in the vehicle's frame, whose origin is the reference point.
 Footprint = tuple[Point, ...]
 
 #: Maximum number of corners of a footprint.
@@ -36,7 +36,7 @@ def _read_footprint(value: Any) -> Footprint:
     """Return the corners of a footprint, counter-clockwise; none for an empty one.
 
     Raises:
-        OptionError: they are not three or more of two finite numbers each, or not those of a polygon around (0, 0).
+        OptionError: they are not three or more of two finite numbers each, or not those of a polygon.
     """
     if isinstance(value, str):
         return _read_footprint_text(value)
@@ -60,7 +60,7 @@ def _read_footprint_text(text: str) -> Footprint:
 
 
 def _checked_corners(given: list[Any] | None, value: Any) -> Footprint:
-    """Return corners as a polygon around the reference point has them; `value` is what messages show."""
+    """Return corners as a polygon has them, counter-clockwise; `value` is what messages show."""
     if given == []:
         return ()
     if not (given and 3 <= len(given) <= MAX_CORNERS and all(map(_is_corner, given))):
@@ -69,8 +69,6 @@ def _checked_corners(given: list[Any] | None, value: Any) -> Footprint:
     polygon = shapely.Polygon(corners)
     if not polygon.is_valid:
         raise _refused(value, "its edges cross or touch; give the corners one after the other along the outline")
-    if not polygon.contains(shapely.Point(0, 0)):
-        raise _refused(value, "the reference point (0, 0) is not inside; give the corners as seen from it")
     return corners if polygon.exterior.is_ccw else corners[::-1]
 
 
@@ -94,20 +92,22 @@ class Vehicle:
 
     A `footprint`, where there is one, is the polygon: its corners (x, y) [m] in the vehicle's frame, whose origin is the
     reference point and whose x axis points ahead; `robot_radius` is then derived from it. It may be given as text,
-    "[[x, y], ...]", too, and is held counter-clockwise. A `wheelbase` L and a `max_steering_angle` phi, set together, determine
-    the turning radius, L / tan(phi) (the paper's equation 1). `from_footprint` and `from_wheelbase` say so by their names.
+    "[[x, y], ...]", too, and is held counter-clockwise. Where it covers no disc around the reference point, such as a trailer's
+    hitch, lower bounds are those without obstacles, and it is not proved that there is no path. A `wheelbase` L and a
+    `max_steering_angle` phi, set together, determine the turning radius, L / tan(phi) (the paper's equation 1). `from_footprint`
+    and `from_wheelbase` say so by their names.
 
     Raises:
-        OptionError: an option is of the wrong type or out of range, the footprint is no polygon around the reference point, or
-            one of wheelbase and steering angle is missing.
+        OptionError: an option is of the wrong type or out of range, the footprint is no polygon, or one of
+            wheelbase and steering angle is missing.
     """
 
     turning_radius: float = option(1.0, "minimum turning radius", unit="m", low=0.001, high=10_000.0)
     robot_radius: float = option(0.2, "radius of the disc around the reference point that covers the vehicle",
                                  unit="m", low=0.0, high=1000.0)
     footprint: tuple[Point, ...] = option(
-        (), "corners of the vehicle's outline around its reference point, x ahead: [[x, y], ...] in m, in place of robot_radius; "
-        "empty is unset", text_form=TextForm(_read_footprint, _footprint_text))
+        (), "corners of the vehicle's outline as seen from its reference point, x ahead: [[x, y], ...] in m, in place of "
+        "robot_radius; empty is unset", text_form=TextForm(_read_footprint, _footprint_text))
     wheelbase: float = option(0.0, "wheelbase, with max_steering_angle in place of turning_radius; 0 is unset", unit="m",
                               low=0.0, high=1000.0)
     max_steering_angle: float = option(0.0, "maximum steering angle, with wheelbase in place of turning_radius; 0 is unset",
@@ -155,10 +155,19 @@ class Vehicle:
 
     @cached_property
     def inscribed_radius(self) -> float:
-        """The radius of the largest disc around the reference point that the vehicle covers [m]."""
+        """The radius of the largest disc around the reference point that the vehicle covers, 0 where there is none [m]."""
         if not self.footprint:
             return self.robot_radius
-        return float(shapely.distance(shapely.LinearRing(self.footprint), shapely.Point(0, 0)))
+        outline, reference_point = shapely.Polygon(self.footprint), shapely.Point(0, 0)
+        return float(outline.exterior.distance(reference_point)) if outline.contains(reference_point) else 0.0
+
+    @property
+    def required_clearance(self) -> float:
+        """The clearance that the reference point needs wherever the vehicle is free [m].
+
+        It is the inscribed radius; minus infinity where the reference point is on the edge of the footprint or outside of it.
+        """
+        return -math.inf if self.footprint and self.inscribed_radius == 0 else self.inscribed_radius
 
     @property
     def maneuver_scale(self) -> float:

@@ -68,8 +68,8 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
     world = World(map, vehicle, allow_unknown)
     if previous is not None and previous.allow_unknown == allow_unknown:
         _reuse(world, previous)
-    world.field.components(vehicle.inscribed_radius)
-    world.field.free_squares(vehicle.inscribed_radius)
+    world.field.components(vehicle.required_clearance)
+    world.field.free_squares(vehicle.required_clearance)
     if vehicle.footprint:
         cover(vehicle.footprint)
     world.obstacles  # noqa: B018 - computed now
@@ -79,7 +79,7 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
 def _reuse(world: World, previous: World) -> None:
     """Take over from `previous` what `world` has in common with it."""
     if world.map is previous.map:
-        takes_as_much_room = world.vehicle.inscribed_radius == previous.vehicle.inscribed_radius
+        takes_as_much_room = world.vehicle.required_clearance == previous.vehicle.required_clearance
         world.field = previous.field if takes_as_much_room else previous.field.shared()
         world.obstacles = previous.obstacles
     else:

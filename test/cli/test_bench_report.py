@@ -11,8 +11,8 @@ from matplotlib.image import imread
 from dubins_rrt_ros.cli.bench import report as bench_report
 from dubins_rrt_ros.cli.bench.plots import sample_cost
 from dubins_rrt_ros.cli.bench.records import parse_record
-from dubins_rrt_ros.cli.common.plots import GOAL, PATH
 from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.planning.pictures.drawing import GOAL, PATH
 
 
 def run(problem, planner, seed, *trace, **more):

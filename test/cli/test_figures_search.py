@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from support.cases import needs_compiled
 
-from dubins_rrt_ros.cli.common.plots import PATH
 from dubins_rrt_ros.evaluation.figures import search as figures_search
 from dubins_rrt_ros.planning import ClearanceField
+from dubins_rrt_ros.planning.pictures.drawing import PATH
 
 pytestmark = needs_compiled  # interpreted, they take minutes
 

@@ -199,7 +199,7 @@ def test_a_footprint_is_taken_as_nav2_writes_it(hall, capsys):
     (["--samples", "0"], "samples is 0"), (["--planner", "a_star"], "--planner"),
     (["--wheelbase", "1"], "max_steering_angle"), (["--start", "1", "2"], "--start"),
     (["--json", "."], "is a folder"),
-    (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.gif"], "p.gif"), (["--sampels", "3"], "--sampels")])
+    (["--json", "nowhere/p.json"], "nowhere"), (["--plot", "p.jpg"], "p.jpg"), (["--sampels", "3"], "--sampels")])
 def test_wrong_usage_takes_one_line(hall, flags, names, capsys):
     assert names in refusal(hall, *REQUEST, *flags, capsys=capsys)
 
@@ -307,6 +307,19 @@ def test_ctrl_c_before_a_path_is_cancelled(hall):
     status, out, shown = on_a_terminal(["gap.wkt", "--start", "-4", "-3", "2", "--goal", "3.5", "3", "2", *budget],
                                        interrupt_at=b"samples/s")
     assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown
+
+
+def test_a_plot_may_be_an_animation_of_the_search(hall, capsys):
+    from PIL import Image
+    status, out, err = run(hall, *REQUEST, *BUDGET, "--paper", "--plot", "p.gif", capsys=capsys)
+    assert (status, err) == (0, "") and "Path of" in out
+    assert Image.open("p.gif").n_frames > 10
+
+
+def test_a_video_without_ffmpeg_is_refused_before_planning(hall, capsys, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert "install the package ffmpeg" in refusal(hall, *REQUEST, "--plot", "p.mp4", capsys=capsys)
+    assert not Path("p.mp4").exists()
 
 
 VIA = ["--via", "-2", "3", "--via", "2", "3", "0"]

@@ -7,8 +7,8 @@ import pytest
 import shapely
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli.common import plots
 from dubins_rrt_ros.planning import GridMap, PolygonMap, Vehicle
+from dubins_rrt_ros.planning.pictures import drawing as plots
 
 L_SHAPE = np.array([[1.0, 1.0], [11.0, 1.0], [11.0, 6.0]])
 NO_TREE, NO_PATH = np.empty((0, 2, 2)), np.empty((0, 3))

@@ -18,6 +18,7 @@ from support.yard import GOAL, IN_UNKNOWN, QUICK, START
 #: Of each parameter the type, the default where the contract has one, and a value that is refused.
 DOUBLE, INTEGER, BOOL, STRING = (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL,
                                  ParameterType.PARAMETER_STRING)
+STRINGS = ParameterType.PARAMETER_STRING_ARRAY
 PARAMETERS = {
     "map_file": (STRING, None, "other.yaml"),
     "map_directory": (STRING, "", "/"),
@@ -47,6 +48,7 @@ PARAMETERS = {
     "publish_tree": (BOOL, None, "no"),
     "replan_on_map_change": (BOOL, None, "no"),
     "map_transient_local": (BOOL, None, "no"),
+    "planner_ids": (STRINGS, ["GridBased"], "GridBased"),
     "max_map_cells": (INTEGER, None, 0),
 }
 CHOICES = {"planner": ["rrt", "rrt_star"], "heading_sampling": ["uniform", "goal", "field", "mixed"]}

@@ -125,7 +125,7 @@ def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, m
     """And what it would have answered is not reported."""
     def report_broken(problem, settings, *, cancel, on_progress):
         answer = plan(problem, settings)
-        on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit=None)))
+        on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit=None), lambda: answer.tree))
         return answer
 
     monkeypatch.setattr(module, "plan", report_broken)

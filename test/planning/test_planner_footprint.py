@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,9 @@ from dubins_rrt_ros.planning import (
     audit_path,
     load_map,
     plan,
+    rasterise,
 )
+from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 
 ROBOT = "[[0.6, 0.3], [-0.6, 0.3], [-0.6, -0.3], [0.6, -0.3]]"
@@ -95,6 +98,46 @@ def test_the_goal_must_hold_the_whole_footprint(kind):
     assert across.status == Status.GOAL_OCCUPIED
     assert "the footprint touches the map's edge at (" in across.message
     assert along.status != Status.GOAL_OCCUPIED
+
+
+#: Trailers 1.2 m long, by the rear edge of what draws them, and by a hitch 0.4 m ahead.
+BY_ITS_EDGE = "[[0, 0.3], [-1.2, 0.3], [-1.2, -0.3], [0, -0.3]]"
+BY_ITS_HITCH = "[[-0.4, 0.3], [-1.6, 0.3], [-1.6, -0.3], [-0.4, -0.3]]"
+
+
+@pytest.mark.parametrize("footprint", [BY_ITS_EDGE, BY_ITS_HITCH], ids=["edge", "hitch"])
+@pytest.mark.parametrize("map", [grid_with_a_gap(slice(120, 160)), polygons_with_a_gap(1.6)], ids=["grid", "polygons"])
+@pytest.mark.parametrize("informed", [True, False])
+def test_bounds_are_the_dubins_curves_alone_where_no_disc_lies_inside(map, footprint, informed):
+    problem = Problem(map, Vehicle(0.8, footprint=footprint), (2.0, 2.0, math.pi / 2), (6.5, 2.0, -math.pi / 2))
+    result = checked(problem, informed=informed)
+    assert result.status == (Status.NONE if SCALE == 1 else result.status), result.message
+    assert result.lower_bound == dubins.shortest(problem.start, problem.goal, 0.8).length
+    words = "the Dubins curve without obstacles" if result.path else "nothing is proved"
+    assert words in result.message and "no disc around the reference point lies inside the footprint" in result.message
+
+
+@needs_compiled
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+def test_a_hitch_may_stand_over_an_obstacle(kind):
+    """Both of the hitch's places lie in a pillar of 0.2 m, which the trailer does not touch."""
+    pillar = shapely.box(5.0, 3.9, 5.2, 4.1)
+    map = PolygonMap(shapely.box(0, 0, 8, 8) - pillar)
+    problem = Problem(map if kind == "polygons" else rasterise(map, 0.05), Vehicle(0.8, footprint=BY_ITS_HITCH), (2.0, 4.0, 0.0),
+                      (5.1, 4.0, 0.0))
+    assert checked(problem).status == Status.NONE
+    inside = replace(problem, vehicle=Vehicle(0.8, footprint=ROBOT))
+    assert plan(inside, Settings(samples=5, seed=1)).status == Status.GOAL_OCCUPIED
+
+
+@needs_compiled
+def test_walls_prove_nothing_of_a_hitch_but_of_the_trailer():
+    """The trailer is on one side of a closed wall and its goal on the other."""
+    problem = Problem(grid_with_a_gap(slice(0)), Vehicle(0.8, footprint=BY_ITS_HITCH), (2.5, 4.0, 0.0), (6.5, 4.0, 0.0))
+    result = plan(problem, Settings(samples=50, seed=1, informed=False, planning_time=60.0))
+    assert result.status == Status.TIMEOUT and "nothing is proved" in result.message
+    touching = replace(problem, start=(4.3, 4.0, 0.0))
+    assert "the footprint touches an obstacle" in plan(touching, Settings(samples=5, seed=1)).message
 
 
 @pytest.mark.parametrize("options", [{"informed": False}, {"shortcut": False}, {"step_size": 1.0},

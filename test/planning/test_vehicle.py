@@ -51,6 +51,14 @@ def test_the_radii_around_the_reference_point():
     assert (Vehicle(1.0, 0.3).inscribed_radius, Vehicle(1.0, 0.3).circumscribed_radius) == (0.3, 0.3)
 
 
+def test_the_radii_where_the_reference_point_is_not_inside():
+    for edge in (0.0, -0.4):
+        vehicle = Vehicle(footprint=[(edge, 0.3), (-1.6, 0.3), (-1.6, -0.3), (edge, -0.3)])
+        assert (vehicle.inscribed_radius, vehicle.circumscribed_radius) == (0.0, math.hypot(1.6, 0.3))
+        assert vehicle.required_clearance == -math.inf
+    assert Vehicle(1.0, 0.3).required_clearance == 0.3 and Vehicle(1.0, 0.0).required_clearance == 0.0
+
+
 def test_a_vehicle_of_a_wheelbase():
     vehicle = Vehicle.from_wheelbase(2.0, 0.5, robot_radius=0.7)
     assert vehicle == Vehicle(robot_radius=0.7, wheelbase=2.0, max_steering_angle=0.5)

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from dubins_rrt_ros.planning.pictures.drawing import DPI, FAILURE, GOAL, PATH, START
+
 from ..common.parser import UsageError
-from ..common.plots import DPI, FAILURE, GOAL, PATH, START
 from .records import Best, RunRecord, Runs
 from .report import quantile, ratio
 

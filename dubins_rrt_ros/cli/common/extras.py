@@ -1,6 +1,6 @@
 """Packages that an installation may lack, since they come with an extra, and what to say where one is missing."""
 
-from importlib.util import find_spec
+from dubins_rrt_ros.planning.pictures import PictureError, check_ffmpeg, check_matplotlib
 
 from .parser import UsageError
 
@@ -11,10 +11,19 @@ def require_matplotlib(extra: str = "plots") -> None:
     Raises:
         UsageError: matplotlib is not installed; the message names the extra that installs it.
     """
-    if find_spec("matplotlib") is None:
-        raise UsageError(f"pictures are drawn by matplotlib, which is not installed; run: {install_command(extra)}")
+    try:
+        check_matplotlib(extra)
+    except PictureError as error:
+        raise UsageError(str(error)) from None
 
 
-def install_command(extra: str) -> str:
-    """Return the command that installs an extra."""
-    return f"pip install 'dubins_rrt_ros[{extra}]'"
+def require_ffmpeg() -> None:
+    """Refuse to make a video without ffmpeg. Called before the work, so that none is lost.
+
+    Raises:
+        UsageError: it is not installed; the message names the package that has it.
+    """
+    try:
+        check_ffmpeg()
+    except PictureError as error:
+        raise UsageError(str(error)) from None

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import Plan
+from dubins_rrt_ros.planning.pictures import ANIMATIONS, VIDEO
 from dubins_rrt_ros.planning.plan_file import to_document
 
-from .extras import require_matplotlib
+from .extras import require_ffmpeg, require_matplotlib
 from .parser import UsageError
 
 STDOUT = "-"
@@ -30,17 +31,24 @@ def check_folder(*files: str | None) -> None:
             raise UsageError(f"{file} is a folder; name a file to write to")
 
 
-def check_drawing(file: str | None) -> None:
+def check_drawing(file: str | None, endings: tuple[str, ...] = DRAWINGS) -> None:
     """Refuse a picture that cannot be drawn. Called before planning, so that no plan is lost.
 
     Raises:
-        UsageError: the name does not end with a known format, or matplotlib is not installed.
+        UsageError: the name does not end with one of the endings, or what draws it is not installed.
     """
     if not file:
         return
-    if Path(file).suffix.lower() not in DRAWINGS:
-        raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(DRAWINGS)}")
+    if Path(file).suffix.lower() not in endings:
+        raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(endings)}")
     require_matplotlib()
+    if Path(file).suffix.lower() == VIDEO:
+        require_ffmpeg()
+
+
+def is_animation(file: str | None) -> bool:
+    """Return True if the ending of a file is that of an animation."""
+    return file is not None and Path(file).suffix.lower() in ANIMATIONS
 
 
 def words_for(json_file: str | None) -> TextIO:

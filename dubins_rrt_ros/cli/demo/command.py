@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.text import install_command
 
 from ..common.example import GOAL, MAP, START
-from ..common.extras import install_command
 from ..common.output import check_drawing, check_folder, words_for, write_document
 from ..common.parser import Parser, add_json_flag, describe
 from .process import DemoError, PlannerProcess
@@ -107,7 +107,8 @@ def _document(answer: "Answer") -> dict[str, Any]:
 
 
 def _draw(file: str, answer: "Answer") -> None:
-    from ..common.plots import Drawing, draw, figures_title, path_title  # here, since matplotlib is slow to import
+    # Here, since matplotlib is slow to import.
+    from dubins_rrt_ros.planning.pictures.drawing import Drawing, draw, figures_title, path_title
     figures, vehicle = answer.figures, Vehicle(PARAMETERS["turning_radius"], PARAMETERS["robot_radius"])
     draw(file, Drawing(answer.map, START, GOAL, vehicle, answer.tree, answer.path,
                        path_title(PARAMETERS["planner"], figures["path_length"], figures["gap"]),

@@ -15,11 +15,23 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon
 from numpy.typing import ArrayLike
 
-from dubins_rrt_ros.cli.common.plots import FAILURE, FREE, GOAL, OBSTACLE, PATH, START, TREE, UNKNOWN, Drawing, draw_on, frame
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, PolygonMap, Pose, Vehicle, rasterise
 from dubins_rrt_ros.planning.collision.footprint import cover
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import SIDES, candidates, shortest
+from dubins_rrt_ros.planning.pictures.drawing import (
+    FAILURE,
+    FREE,
+    GOAL,
+    OBSTACLE,
+    PATH,
+    START,
+    TREE,
+    UNKNOWN,
+    Drawing,
+    draw_on,
+    frame,
+)
 
 #: Width of a figure [inch], and font sizes.
 WIDTH, TITLE, LABEL = 7.2, 13, 12

@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from dubins_rrt_ros.cli.common.plots import (
+from dubins_rrt_ros.planning import ClearanceField, Path, Plan, Problem, Progress, Settings, plan
+from dubins_rrt_ros.planning.pictures.drawing import (
     FAILURE,
     FREE,
     GOAL,
@@ -30,7 +31,6 @@ from dubins_rrt_ros.cli.common.plots import (
     frame,
     planner_title,
 )
-from dubins_rrt_ros.planning import ClearanceField, Path, Plan, Problem, Progress, Settings, plan
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.lower_bound import lower_bound
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from dubins_rrt_ros.cli.bench.report import quantile
-from dubins_rrt_ros.cli.common.plots import DPI, GOAL, PATH, Drawing, decorate, draw, planner_title
+from dubins_rrt_ros.planning.pictures.drawing import DPI, GOAL, PATH, Drawing, decorate, draw, planner_title
 
 from .runs import (
     CONVERGENCE,

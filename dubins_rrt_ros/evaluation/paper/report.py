@@ -7,7 +7,7 @@ from typing import Any
 
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.cli.bench.report import median, metres, milliseconds, quartiles, table, with_quartiles
-from dubins_rrt_ros.cli.common.plots import planner_title
+from dubins_rrt_ros.planning.pictures.drawing import planner_title
 
 from .answer import FOUND, WHY, found, why
 from .runs import (

@@ -30,6 +30,8 @@ from .raster import CLEARANCE_MARGIN, grid_clearance, polygon_clearance
 SQUARE_SHARE = 0.6
 #: ... and approximate maximum number of squares, for which they are made larger.
 MAX_SQUARES = 270_000 if COMPILED else 4_000
+#: Number of squares along the longer side of a map where obstacles do not matter to the reference point.
+SQUARES_WITHOUT_OBSTACLES = 64
 
 
 class FreeSquares(NamedTuple):
@@ -93,21 +95,29 @@ class ClearanceField:
         if not vehicle.footprint:
             return CollisionChecker(clearance=self.kernel, required_clearance=vehicle.robot_radius)
         found = cover(vehicle.footprint)
-        return PolygonChecker(clearance=self.kernel, required_clearance=vehicle.inscribed_radius, discs=found.discs,
+        return PolygonChecker(clearance=self.kernel, required_clearance=vehicle.required_clearance, discs=found.discs,
                               corners=found.corners, first_corner=found.first_corner,
                               worth=max(found.excess, 2 * CLEARANCE_MARGIN))
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
         """Return whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
-        # The kernel's distance to polygons has no sign.
-        return bool(self.at(np.array(pose[:2])) > 0) and self.collision_checker(vehicle).is_pose_free(pose)
+        return self._is_outside_obstacles(pose, vehicle) and self.collision_checker(vehicle).is_pose_free(pose)
 
     def curve_is_free(self, curve: DubinsCurve, vehicle: Vehicle) -> bool:
         """Return whether the vehicle touches no obstacle along a curve; `_kernels/collision.py` states the guarantee."""
         # What starts in free space stays there, as no edge is crossed.
-        if not self.at(np.array(curve.start[:2])) > 0:
+        if not self._is_outside_obstacles(curve.start, vehicle):
             return False
         return self.collision_checker(vehicle).is_motion_free(curve.start, curve.radius, curve.index, curve.lengths)
+
+    def _is_outside_obstacles(self, pose: Pose, vehicle: Vehicle) -> bool:
+        """Return whether a point of the vehicle is in free space: the kernel's distance to polygons has no sign."""
+        x, y, theta = pose
+        if vehicle.required_clearance < 0:  # its reference point is no point of it
+            along, across = vehicle.footprint[0]
+            x += along * math.cos(theta) - across * math.sin(theta)
+            y += along * math.sin(theta) + across * math.cos(theta)
+        return bool(self.at(np.array([x, y])) > 0)
 
     def cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rows and columns of the raster's cells that hold (..., 2) points of the map."""
@@ -139,12 +149,21 @@ class ClearanceField:
         """Return the squares that may hold a point with the required clearance [m]; they are kept for the last one."""
         kept = self._free_squares
         if kept is None or kept[0] != required_clearance:
-            cells = _cells_of_square(self.kernel.field.shape, SQUARE_SHARE * required_clearance / self.kernel.resolution)
-            self._free_squares = kept = (required_clearance,
-                                         FreeSquares(cells, free_squares(self.kernel, cells, required_clearance)))
+            self._free_squares = kept = required_clearance, self._find_free_squares(required_clearance)
         return kept[1]
 
+    def _find_free_squares(self, required_clearance: float) -> FreeSquares:
+        shape = self.kernel.field.shape
+        if required_clearance < 0:
+            cells = math.ceil(max(shape) / SQUARES_WITHOUT_OBSTACLES)
+            rows, columns = (math.ceil(side / cells) for side in shape)
+            return FreeSquares(cells, np.pad(np.ones((rows, columns), np.int8), (1, 2)))  # a border as free_squares makes
+        cells = _cells_of_square(shape, SQUARE_SHARE * required_clearance / self.kernel.resolution)
+        return FreeSquares(cells, free_squares(self.kernel, cells, required_clearance))
+
     def _may_be_free(self, bounds: np.ndarray, required_clearance: float) -> np.ndarray:
+        if required_clearance < 0:
+            return np.ones(bounds.shape, bool)
         # The bound of a cell is at most two of its diagonals below the clearance of any point in it.
         enough: np.ndarray = bounds >= max(0.0, required_clearance - 2 * math.sqrt(2) * self.kernel.resolution - 1e-6)
         return enough

@@ -16,8 +16,8 @@ def are_separated(problem: Problem, field: ClearanceField) -> bool:
 
     The components are those of a superset of the free space, so that True is a proof; False proves nothing.
     """
-    return (_have_different_labels(problem, field, field.components(problem.vehicle.inscribed_radius))
-            or _are_in_different_polygons(problem))
+    return (_have_different_labels(problem, field, field.components(problem.vehicle.required_clearance))
+            or (problem.vehicle.required_clearance >= 0 and _are_in_different_polygons(problem)))
 
 
 def are_walled_off(problem: Problem, field: ClearanceField) -> bool:

@@ -33,6 +33,8 @@ from .widest_passage import Passage, sample_spacing, widest_passage, widest_pass
 CURVATURES = np.linspace(-1, 1, 33)
 #: Maximum number of steps along these arcs.
 MAX_STEPS = 2000
+#: Why bounds and proofs that rest on the clearance of the reference point are left out.
+NO_DISC = "no disc around the reference point lies inside the footprint"
 #: Number of points across a footprint, and along each of its edges, that are looked at to tell where it touches something.
 POINTS = 33
 
@@ -54,7 +56,7 @@ class Diagnosis:
 
 def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
     """Return why there provably is no path, if that can be known without a search."""
-    required = problem.vehicle.inscribed_radius + CLEARANCE_MARGIN
+    required = problem.vehicle.required_clearance + CLEARANCE_MARGIN
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
             ("Goal", problem.goal, problem.goal_tolerance_xy, Status.GOAL_OUTSIDE_MAP, Status.GOAL_OCCUPIED)):
@@ -87,6 +89,8 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str,
     if math.dist(problem.start[:2], problem.goal[:2]) < radius / 10:
         return ("the goal is so close to the start that a vehicle that cannot turn on the spot has to drive a full loop to it; "
                 f"set goal_tolerance_xy and goal_tolerance_yaw if it is close enough, or allow more {more}"), None
+    if problem.vehicle.required_clearance < 0:
+        return f"{NO_DISC}, so that nothing is proved; {_nearest_to_goal(problem, tree, more)}", None
     stuck = _all_arcs_hit(problem, field, problem.start)
     if stuck and _distances(tree, problem.start).max() <= 2 * stuck[0]:
         return (f"every forward arc from the start hits an obstacle within {rounded_up(stuck[0])} m, the longest at "
@@ -102,8 +106,13 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str,
         return _unknown_between(problem, field) or _narrow_between(problem, field, passage)
     if len(tree) == 1:
         return f"no curve of the turning radius {radius:g} m left the start; set step_size, or allow more {more}", None
+    return _nearest_to_goal(problem, tree, more), None
+
+
+def _nearest_to_goal(problem: Problem, tree: Tree, more: str) -> str:
+    """Return a clause that says how near to the goal a tree came."""
     near = float(_distances(tree, problem.goal).min())
-    return f"the tree came within {rounded_up(near)} m of the goal; allow more {more}, or loosen the goal's tolerance", None
+    return f"the tree came within {rounded_up(near)} m of the goal; allow more {more}, or loosen the goal's tolerance"
 
 
 def _outside_message(problem: Problem, name: str, pose: Pose, tolerance: float, nearest: Point) -> str:

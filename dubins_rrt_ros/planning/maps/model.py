@@ -5,15 +5,19 @@ import math
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from ..pictures import Plottable, check_matplotlib
 from ..text import quoted
 from .errors import MapError, MapMetadataError
 from .frame import LARGEST_YAW, Frame
 from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, polygons_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
@@ -51,8 +55,22 @@ DEFAULT_THRESHOLDS = Thresholds()
 FINEST, FARTHEST = 1e-4, 1e8
 
 
+class _PlottableMap(Plottable):
+    """A base of maps, with their pictures."""
+
+    def plot(self: "Map", ax: "Axes | None" = None) -> "Axes":  # type: ignore[misc]
+        """Draw free, occupied and unknown space, on axes or in a new pyplot figure, and return the axes.
+
+        Raises:
+            PictureError: matplotlib is not installed.
+        """
+        check_matplotlib()
+        from ..pictures.plots import plot_map
+        return plot_map(self, ax)
+
+
 @dataclass(frozen=True, eq=False)
-class GridMap:
+class GridMap(_PlottableMap):
     """An occupancy grid.
 
     Attributes:
@@ -157,7 +175,7 @@ class GridMap:
 
 
 @dataclass(frozen=True, eq=False)
-class PolygonMap:
+class PolygonMap(_PlottableMap):
     """Free space as polygons: `PolygonMap(free)`, or `PolygonMap.of(bounds, obstacles)`.
 
     Attributes:

@@ -40,12 +40,12 @@ class CostToGo:
     @classmethod
     def to_goal(cls, problem: Problem, field: ClearanceField) -> "CostToGo":
         """Return the costs to where the goal is reached."""
-        return cls(field, problem.vehicle.inscribed_radius, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
+        return cls(field, problem.vehicle.required_clearance, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
 
     @classmethod
     def from_start(cls, problem: Problem, field: ClearanceField) -> "CostToGo":
         """Return the costs from the start."""
-        return cls(field, problem.vehicle.inscribed_radius, problem.start[:2])
+        return cls(field, problem.vehicle.required_clearance, problem.start[:2])
 
     def finish(self) -> None:
         """Compute all costs now, so that several threads may ask for them."""

@@ -77,16 +77,18 @@ class Search:
         best: the node that reaches the goal at the least cost, or -1.
         found_by: what found the path there, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one.
         ready: True if there is a path whose smoothing has been done; better ones that are still to be smoothed do not matter.
+        bound: the cost-to-go as a lower bound, once it is one, or None.
     """
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None,
-                 deadline: Deadline | None = None, seed_path: Path | None = None):
+                 deadline: Deadline | None = None, report_samples: int = 0, seed_path: Path | None = None):
         """Prepare a search.
 
         Args:
             to_goal: needed with `informed`, and with headings along the cost-to-go.
             seed_path: a free path of the problem, in place of the first one of hybrid A*.
             deadline: when it is over what is under way is cut short; the steps of `run` that follow it are unspecified.
+            report_samples: number of samples after each of which a step of `run` ends; 0 for any.
         """
         corners = problem.map.corners()
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
@@ -95,6 +97,8 @@ class Search:
         self.best = -1
         self.found_by = ""
         self.ready = False
+        self.bound: CostToGo | None = None
+        self._report_samples = report_samples
         self._deadline = deadline or Deadline(math.inf, never)
         self._problem, self._settings, self._seed_path = problem, settings, seed_path
         self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
@@ -263,7 +267,7 @@ class Search:
     def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
         """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
         left = self._settings.samples - self.samples
-        end = min(begin + min(size, left if left > 0 else size), BLOCK)
+        end = min(begin + min(size, left if left > 0 else size, self._until_report()), BLOCK)
         self._kernel.reserve(end - begin)
         started = time.perf_counter()
         # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
@@ -276,6 +280,10 @@ class Search:
         if self.cost < before:
             self.found_by = "rrt" if is_rrt else "rrt_star"
         return next_one, min(max(1, int(BATCH_TIME * taken / max(took, 1e-6))), 2 * size, BLOCK)
+
+    def _until_report(self) -> int:
+        """Return the maximum number of samples up to the next report."""
+        return self._report_samples - self.samples % self._report_samples if self._report_samples else BLOCK
 
     def _end_block(self) -> None:
         """Take what hybrid A* found in the background, and let it go on."""
@@ -296,7 +304,7 @@ class Search:
         from_start = self._bounds.from_start
         if from_start is None:
             from_start = self._bounds.make_from_start()  # first, as it was started last and may not be under way yet
-            self.make_bound()
+            self.bound = self.make_bound()
         self._kernel.set_cost_bound(self.cost, from_start.kernel, self._bounds.to_goal.kernel)
         wanted = self._bounds.nodes_to_keep(np.asarray(self._tree.poses)[:self.size, :2], self.cost)
         if wanted is not None:

@@ -76,7 +76,7 @@ class Sampler:
 
     def _may_be_reached(self, points: np.ndarray) -> np.ndarray:
         """Return (n,) bool: True where (n, 2) points may be free and, unless the sampling is plain, connected with the start."""
-        required_clearance = self._problem.vehicle.inscribed_radius
+        required_clearance = self._problem.vehicle.required_clearance
         if self._settings.informed:
             components = self._field.components(required_clearance)
             if of_start := components[self._field.cells(np.array(self._problem.start[:2]))]:

@@ -1,6 +1,7 @@
 """The search tree as a result: arrays, apart from those of the search."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,13 @@ from ..curves.angles import heading_error, position_error
 from ..curves.dubins import TURNS, DubinsCurve, poses_on
 from ..curves.path import Path
 from ..errors import PlanningError
+from ..pictures import Plottable, check_matplotlib
 from ..problem import Pose
 from ..vehicle import Vehicle
 from .cost import edge_costs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class TreeError(PlanningError, AssertionError):
@@ -20,7 +25,7 @@ class TreeError(PlanningError, AssertionError):
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class Tree(Plottable):
     """Nodes and the edges from their parents. Node 0 is the start.
 
     Attributes:
@@ -81,6 +86,16 @@ class Tree:
         ends = [poses_on(self.poses, self.words, self.lengths, self.radius, self.parents[nodes], nodes,
                          begins[arc] + (nth + end) * piece)[:, :2] for end in (0, 1)]
         return np.stack(ends, axis=1)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw all edges, on axes or in a new pyplot figure, and return the axes.
+
+        Raises:
+            PictureError: matplotlib is not installed.
+        """
+        check_matplotlib()
+        from ..pictures.plots import plot_tree
+        return plot_tree(self, ax)
 
     def check(self, field: ClearanceField | None = None, vehicle: Vehicle | None = None) -> None:
         """Check the invariants; with a field and a vehicle also that this touches no obstacle along any edge.

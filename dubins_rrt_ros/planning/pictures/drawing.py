@@ -1,22 +1,24 @@
-"""Pictures of a plan: map, tree and path, to scale. It needs matplotlib, so commands import it only when they draw."""
+"""Pictures of a plan for files: map, tree and path, to scale, with titles."""
 
 import math
 import textwrap
 from collections.abc import Sequence
-from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Polygon
-from matplotlib.path import Path as Contour
 from matplotlib.transforms import Affine2D
 
-from dubins_rrt_ros.planning import GridMap, Map, Plan, Vehicle
+from ..maps.model import GridMap, Map
+from ..vehicle import Vehicle
+from .outlines import body, contour, swept
+
+if TYPE_CHECKING:
+    from ..result import Plan
 
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
@@ -24,10 +26,10 @@ TREE, PATH, START, GOAL, FAILURE = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "
 DPI = 160
 #: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
+#: Opacity of the area that the vehicle sweeps.
+SWEPT = 0.18
 #: Height of a line below the title [inch], and number of its letters to the inch.
 LINE, LETTERS = 0.19, 13.5
-#: Maximum error of the edge of the area that a disc sweeps, in its radii.
-FLAT = 0.01
 
 
 class Drawing(NamedTuple):
@@ -55,15 +57,20 @@ class Drawing(NamedTuple):
     location: tuple[float, float] | None = None
 
 
-def draw_plan(file: str, plan: Plan) -> None:
+def draw_plan(file: str, plan: "Plan") -> None:
     """Draw a plan to a file, whose ending selects the format."""
+    draw(file, of_plan(plan))
+
+
+def of_plan(plan: "Plan") -> Drawing:
+    """Return what the picture of a plan holds."""
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
     title, subtitle = _captions(plan)
-    draw(file, Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
-                       plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location))
+    return Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
+                   plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location)
 
 
-def _captions(plan: Plan) -> tuple[str, str]:
+def _captions(plan: "Plan") -> tuple[str, str]:
     name = planner_title(plan.settings.planner)
     if plan.length is None or plan.gap is None or plan.time_to_first is None:
         return f"{name}: no path, {plan.status.name}", plan.message
@@ -100,9 +107,8 @@ def draw(file: str, drawing: Drawing) -> None:
 def draw_on(axes: Axes, drawing: Drawing) -> None:
     """Draw all but the titles on axes that `frame` has fitted to the map."""
     draw_map(axes, drawing.map)
-    # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
-    axes.add_collection(LineCollection(list(drawing.tree), colors=TREE, linewidths=0.5, rasterized=True, zorder=2))
-    _draw_path(axes, drawing)
+    draw_tree(axes, drawing.tree)
+    draw_path(axes, drawing.vehicle, drawing.path)
     draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
     if drawing.location is not None:
         axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
@@ -110,7 +116,7 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
 
 def frame(axes: Axes, world_map: Map) -> None:
     """Fit axes to a map, with equal scales and a rim of the obstacle around it."""
-    low, high = _view(world_map)
+    low, high = view(world_map)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]", aspect="equal", facecolor=OBSTACLE)
     axes.ticklabel_format(useOffset=False, style="plain")
 
@@ -137,7 +143,7 @@ def decorate(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _view(world_map: Map) -> tuple[np.ndarray, np.ndarray]:
+def view(world_map: Map) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the view: the map and a rim of the obstacle around it."""
     corners = world_map.corners()
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -147,7 +153,7 @@ def _view(world_map: Map) -> tuple[np.ndarray, np.ndarray]:
 
 def _canvas(drawing: Drawing) -> tuple[Figure, Axes]:
     """Make a figure, with its title, in the shape of the view, so that equal axes leave no blank."""
-    low, high = _view(drawing.map)
+    low, high = view(drawing.map)
     width, height = MAP_SIDE * (high - low) / (high - low).max()
     across = max(width + LEFT + RIGHT, WIDTH)
     lines = textwrap.wrap(drawing.subtitle, int(LETTERS * (across - LEFT)))
@@ -166,7 +172,7 @@ def draw_map(axes: Axes, world_map: Map, free: str = FREE) -> None:
     if isinstance(world_map, GridMap):
         _draw_grid(axes, world_map, free)
     else:
-        axes.add_patch(PathPatch(_contour(world_map.free), facecolor=free, edgecolor="none", zorder=1))
+        axes.add_patch(PathPatch(contour(world_map.free), facecolor=free, edgecolor="none", zorder=1))
 
 
 def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
@@ -179,50 +185,28 @@ def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
     axes.axis(view)
 
 
-def _contour(polygons: shapely.Geometry) -> Contour:
-    """Join all rings to one contour: shells counter-clockwise and holes clockwise, so that holes stay empty."""
-    parts = []
-    for polygon in shapely.get_parts(polygons):
-        for ring, is_shell in ((polygon.exterior, True), *((hole, False) for hole in polygon.interiors)):
-            points = np.asarray(ring.coords)[:, :2]
-            if len(points):
-                parts.append(Contour(points if ring.is_ccw == is_shell else points[::-1], closed=True))
-    return Contour.make_compound_path(*parts) if parts else Contour(np.empty((0, 2)))
+def draw_tree(axes: Axes, segments: np.ndarray) -> LineCollection:
+    """Draw (m, 2, 2) line segments of the edges of a tree."""
+    # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
+    lines = LineCollection(list(segments), colors=TREE, linewidths=0.5, rasterized=True, zorder=2)
+    axes.add_collection(lines)
+    return lines
 
 
-def _draw_path(axes: Axes, drawing: Drawing) -> None:
-    if len(drawing.path) == 0:
+def draw_path(axes: Axes, vehicle: Vehicle, path: np.ndarray) -> None:
+    """Draw (n, 3) poses close together, if any, and the area that the vehicle sweeps along them."""
+    if len(path) == 0:
         return
-    x, y = drawing.path[:, 0], drawing.path[:, 1]
-    swept = _contour(_swept(drawing.vehicle, drawing.path))
-    axes.add_patch(PathPatch(swept, facecolor=PATH, alpha=0.18, edgecolor="none", zorder=3))
-    axes.plot(x, y, color=PATH, linewidth=2.4, solid_capstyle="round", solid_joinstyle="round", zorder=4)
-
-
-def _swept(vehicle: Vehicle, path: np.ndarray) -> shapely.Geometry:
-    """Return the area that the vehicle sweeps along a path, with straight lines from pose to pose."""
-    if not vehicle.footprint:
-        line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
-        # Corners that are too flat to see would make up most of the file.
-        return line.buffer(vehicle.robot_radius).simplify(FLAT * vehicle.robot_radius)
-    bodies = [_body(vehicle, pose) for pose in path]
-    return shapely.union_all([shapely.union(*pair).convex_hull for pair in pairwise(bodies)] or bodies)
-
-
-def _body(vehicle: Vehicle, pose: Sequence[float]) -> shapely.Polygon:
-    """Return the area that the vehicle covers at a pose."""
-    x, y, theta = pose
-    if not vehicle.footprint:
-        return shapely.Point(x, y).buffer(vehicle.robot_radius)
-    return shapely.Polygon(Affine2D().rotate(theta).translate(x, y).transform(vehicle.footprint))
+    axes.add_patch(PathPatch(swept(vehicle, path), facecolor=PATH, alpha=SWEPT, edgecolor="none", zorder=3))
+    axes.plot(path[:, 0], path[:, 1], color=PATH, linewidth=2.4, solid_capstyle="round", solid_joinstyle="round", zorder=4)
 
 
 def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:
     """Draw the vehicle and an arrow along its heading."""
     x, y, theta = pose
-    body = _contour(_body(vehicle, pose))
-    axes.add_patch(PathPatch(body, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
-    axes.add_patch(PathPatch(body, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
+    area = body(vehicle, pose)
+    axes.add_patch(PathPatch(area, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
+    axes.add_patch(PathPatch(area, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
     arrow = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
     place = Affine2D().rotate(theta).translate(x, y)
     axes.add_patch(Polygon(place.transform(arrow), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))

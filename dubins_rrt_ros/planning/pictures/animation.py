@@ -1,0 +1,228 @@
+"""Animations of a search: the tree grows, the path becomes shorter and the lower bound rises.
+
+>>> recording = Recording()
+>>> result = plan(problem, settings, on_progress=recording, report_samples=50)
+>>> recording.save("maze.gif", result)
+"""
+
+import base64
+import io
+import json
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from . import ANIMATIONS, VIDEO, check_ffmpeg
+from .drawing import BOTTOM, LEFT, PATH, RIGHT, Drawing, draw_map, draw_path, draw_poses, draw_tree, frame, of_plan, view
+
+if TYPE_CHECKING:
+    from ..result import Plan, Progress
+
+#: Maximum number of frames; of more, some are left out evenly.
+MOST_FRAMES = 90
+#: Time that a frame is shown, and the last one [ms].
+SHOWN, LAST_SHOWN = 90, 2500
+#: Longer side of the map, height of the curves below it, and room for the title [inch].
+MAP_SIDE, CURVES, TITLE = 5.0, 1.15, 0.5
+#: Resolution [1/inch], and number of colours.
+DPI, COLOURS = 100, 64
+#: The colour of the lower bound.
+BOUND = "#0072b2"
+
+
+class Frame(NamedTuple):
+    """The state of a search that one frame shows.
+
+    Attributes:
+        drawing: tree and path; its titles are not shown.
+        samples: number of samples drawn so far.
+        length: length of the path so far [m], or None.
+        lower_bound: no path is shorter [m].
+    """
+
+    drawing: Drawing
+    samples: int
+    length: float | None
+    lower_bound: float
+
+
+class Recording:
+    """A record of a search, made as the `on_progress` of plan()."""
+
+    def __init__(self, samples: int = 0):
+        """Keep a frame after so many samples at least, and one for each better path."""
+        self._every = samples
+        self._frames: list[Frame] = []
+
+    @property
+    def frames(self) -> int:
+        """The number of frames of the animation."""
+        return min(len(self._frames) + 1, MOST_FRAMES)
+
+    def __call__(self, progress: "Progress") -> None:
+        """Keep the state of a search."""
+        last = self._frames[-1].samples if self._frames else -self._every
+        if progress.improved or progress.samples >= last + max(1, self._every):
+            self._add(replace(progress.snapshot(), tree=progress.tree(), samples=progress.samples))
+
+    def _add(self, plan: "Plan") -> None:
+        self._frames.append(Frame(of_plan(plan), plan.samples, plan.length, plan.lower_bound))
+
+    def save(self, file: str, plan: "Plan", on_frame: Callable[[int], None] | None = None) -> None:
+        """Write the animation, which ends with the plan; the ending of the file, .gif, .mp4 or .html, selects the format.
+
+        Args:
+            file: what to write.
+            plan: the answer of the search that was recorded.
+            on_frame: called after each frame with the number of those that are drawn, of `frames`.
+
+        Raises:
+            PictureError: the ending is .mp4, and ffmpeg is not installed.
+        """
+        ending = Path(file).suffix.lower()
+        if ending == VIDEO:
+            check_ffmpeg()
+        chosen = np.unique(np.linspace(0, len(self._frames), self.frames).round().astype(int))
+        self._add(plan)
+        pictures = []
+        for picture in _Screen(self._frames).pictures([self._frames[i] for i in chosen]):
+            pictures.append(picture)
+            if on_frame:
+                on_frame(len(pictures))
+        WRITERS[ending](file, pictures)
+
+
+class _Screen:
+    """A figure that shows frame after frame: the map, and below it path and bound over the samples."""
+
+    def __init__(self, frames: Sequence[Frame]):
+        self._frames = frames
+        drawing = frames[-1].drawing
+        low, high = view(drawing.map)
+        width, height = MAP_SIDE * (high - low) / (high - low).max()
+        below = BOTTOM + CURVES + BOTTOM
+        across, up = width + LEFT + RIGHT, below + height + TITLE
+        self._figure = Figure(figsize=(across, up), dpi=DPI)
+        self._map = self._figure.add_axes((LEFT / across, below / up, width / across, height / up))
+        frame(self._map, drawing.map)
+        self._map.set(xlabel="")
+        draw_map(self._map, drawing.map)
+        self._curves = self._figure.add_axes((LEFT / across, BOTTOM / up, width / across, CURVES / up))
+        self._prepare_curves(self._curves)
+        self._title = self._figure.text(LEFT / across, 1 - 0.13 / up, "", fontsize=11, weight="bold", va="top")
+
+    def _prepare_curves(self, axes: Axes) -> None:
+        """Fit the axes of the curves to all frames."""
+        values = (value for one in self._frames for value in (one.length, one.lower_bound))
+        known = [value for value in values if value is not None and np.isfinite(value)]
+        margin = 0.08 * (max(known) - min(known)) or 1.0
+        axes.set(xlim=(0, max(1, self._frames[-1].samples)), ylim=(min(known) - margin, max(known) + margin), xlabel="samples",
+                 ylabel="length [m]")
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+        axes.spines[["top", "right"]].set_visible(False)
+        self._lines = [axes.plot([], [], color=colour, linewidth=2, label=label, drawstyle="steps-post")[0]
+                       for colour, label in ((PATH, "path"), (BOUND, "no path is shorter"))]
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 0.93), ncols=2, fontsize=8, frameon=False)
+        for one in (self._map, axes):
+            one.tick_params(labelsize=8)
+            one.yaxis.label.set_fontsize(9)
+            one.xaxis.label.set_fontsize(9)
+
+    def pictures(self, frames: Sequence[Frame]) -> Iterator[Image.Image]:
+        """Yield the pictures of frames, in order."""
+        for shown in frames:
+            artists = set(self._map.get_children())
+            self._show(shown)
+            pixels = io.BytesIO()
+            self._figure.savefig(pixels, format="rgba", dpi=DPI)
+            width, height = self._figure.canvas.get_width_height()
+            yield Image.frombytes("RGBA", (width, height), pixels.getvalue()).convert("RGB")
+            for artist in set(self._map.get_children()) - artists:
+                artist.remove()
+
+    def _show(self, shown: Frame) -> None:
+        drawing = shown.drawing
+        draw_tree(self._map, drawing.tree)
+        draw_path(self._map, drawing.vehicle, drawing.path)
+        draw_poses(self._map, drawing.start, drawing.goal, drawing.vehicle)
+        past = [one for one in self._frames if one.samples <= shown.samples]
+        samples = [one.samples for one in past]
+        self._lines[0].set_data(samples, [np.nan if one.length is None else one.length for one in past])
+        self._lines[1].set_data(samples, [one.lower_bound for one in past])
+        length = "no path yet" if shown.length is None else f"path {shown.length:.2f} m"
+        self._title.set_text(f"{shown.samples} samples, {length}\nno path is shorter than {shown.lower_bound:.2f} m")
+
+
+def _write_gif(file: str, pictures: Sequence[Image.Image]) -> None:
+    first, *others = _with_few_colours(pictures)
+    first.save(file, save_all=True, append_images=others, duration=_durations(pictures), loop=0, optimize=True)
+
+
+def _with_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
+    """Return the pictures in one palette, that of the last, in which everything is seen."""
+    palette = pictures[-1].quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    return [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+
+
+def _durations(pictures: Sequence[Image.Image]) -> list[int]:
+    return [SHOWN] * (len(pictures) - 1) + [LAST_SHOWN]
+
+
+def _write_mp4(file: str, pictures: Sequence[Image.Image]) -> None:
+    width, height = pictures[0].size
+    command = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+               "-r", f"{1000 / SHOWN:.3f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p",
+               "-movflags", "+faststart", file]
+    held = [pictures[-1]] * round(LAST_SHOWN / SHOWN)
+    subprocess.run(command, input=b"".join(picture.tobytes() for picture in (*pictures, *held)), check=True)
+
+
+_PAGE = Template("""<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><title>A search for a path</title>
+<style>body { font: 16px sans-serif; max-width: $width; margin: 1em auto; } img { width: 100%; } input { width: 75%; }</style>
+<img id="picture" alt="The map with the tree, the path, the start and the goal">
+<p><button id="play">Pause</button> <input id="frame" type="range" min="0" value="0" aria-label="frame"></p>
+<script>
+const frames = $frames, picture = document.getElementById("picture");
+const slider = document.getElementById("frame"), button = document.getElementById("play");
+let timer = null;
+function show(i) { slider.value = i; picture.src = "data:image/png;base64," + frames[i]; }
+function step() {
+  const next = (Number(slider.value) + 1) % frames.length;
+  show(next);
+  timer = setTimeout(step, next === frames.length - 1 ? $last : $shown);
+}
+function pause() { clearTimeout(timer); timer = null; button.textContent = "Play"; }
+button.onclick = () => { if (timer) { pause(); } else { button.textContent = "Pause"; step(); } };
+slider.max = frames.length - 1;
+slider.oninput = () => { pause(); show(Number(slider.value)); };
+show(0);
+timer = setTimeout(step, $shown);
+</script>
+</html>
+""")
+
+
+def _write_html(file: str, pictures: Sequence[Image.Image]) -> None:
+    """Write a page that holds all frames, and needs no network."""
+    frames = []
+    for picture in _with_few_colours(pictures):
+        png = io.BytesIO()
+        picture.save(png, "png", optimize=True)
+        frames.append(base64.b64encode(png.getvalue()).decode())
+    page = _PAGE.substitute(frames=json.dumps(frames), width=f"{pictures[0].width}px", shown=SHOWN, last=LAST_SHOWN)
+    Path(file).write_text(page, encoding="utf-8")
+
+
+#: What writes an animation, by the endings of files.
+WRITERS: dict[str, Callable[[str, Sequence[Image.Image]], None]] = dict(
+    zip(ANIMATIONS, (_write_gif, _write_mp4, _write_html), strict=True))

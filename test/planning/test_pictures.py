@@ -1,0 +1,143 @@
+"""Pictures from the library: plots on axes, notebooks, animations; and that none of it is imported before it is asked for."""
+
+import io
+import re
+import subprocess
+import sys
+
+import matplotlib.figure
+import matplotlib.pyplot
+import numpy as np
+import pytest
+from PIL import Image
+from support.cases import empty_map
+
+from dubins_rrt_ros.planning import PictureError, Problem, Settings, Vehicle, pictures, plan
+from dubins_rrt_ros.planning.pictures import drawing
+from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
+
+EVERY, SAMPLES = 7, 60
+
+
+@pytest.fixture(autouse=True)
+def _no_windows():
+    matplotlib.use("Agg")
+    yield
+    matplotlib.pyplot.close("all")
+
+
+def problem_here(start=(-8.0, 0.0, 0.0)):
+    return Problem(empty_map(), Vehicle(), start, (8.0, 3.0, 0.0))
+
+
+def recorded(samples=SAMPLES, every=EVERY):
+    """A recording of the paper's RRT*, with its answer and the numbers of samples that were reported."""
+    recording, reported = Recording(every), []
+
+    def follow(progress):
+        reported.append(progress.samples)
+        recording(progress)
+
+    settings = Settings.paper(samples=samples, planning_time=60.0, seed=1)
+    return recording, plan(problem_here(), settings, on_progress=follow, report_samples=every), reported
+
+
+def legend(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_importing_the_planner_imports_no_matplotlib():
+    code = "import sys, dubins_rrt_ros.planning; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_a_plan_is_drawn_on_axes_of_its_own_or_on_those_given():
+    figure = matplotlib.figure.Figure()
+    axes = figure.add_subplot()
+    result = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1))
+    assert result.plot(axes) is axes and result.plot() is not axes
+    assert f"{result.length:.2f} m" in axes.get_title()
+    assert {"free", "obstacle", "path", "swept by the vehicle"} <= set(legend(axes))
+    lines = [line.get_xydata() for line in axes.lines if line.get_color() == drawing.PATH]
+    assert np.array_equal(lines[0], result.poses()[:, :2])
+
+
+def test_a_plan_without_a_path_shows_the_cause():
+    result = plan(problem_here(start=(-9.95, 0.0, 0.0)))
+    axes = result.plot()
+    assert result.status.name in axes.get_title() and "why there is no path" in legend(axes) and "path" not in legend(axes)
+
+
+def test_a_map_and_a_tree_share_axes():
+    result = plan(problem_here(), Settings.paper(samples=50, planning_time=60.0, seed=1))
+    axes = result.problem.map.plot()
+    limits = axes.get_xlim(), axes.get_ylim()
+    assert result.tree.plot(axes) is axes and (axes.get_xlim(), axes.get_ylim()) == limits
+    alone = result.tree.plot()
+    low, high = result.tree.poses[:, 0].min(), result.tree.poses[:, 0].max()
+    assert alone.get_xlim()[0] < low < high < alone.get_xlim()[1] and alone.get_aspect() == 1.0
+
+
+def test_notebooks_show_maps_trees_and_plans():
+    result, before = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1)), matplotlib.pyplot.get_fignums()
+    for shown in (result, result.tree, result.problem.map):
+        assert Image.open(io.BytesIO(shown._repr_png_())).format == "PNG"
+    assert matplotlib.pyplot.get_fignums() == before, "a picture of a notebook is no figure of pyplot"
+
+
+def test_without_matplotlib_notebooks_show_text_and_plots_say_what_to_install(monkeypatch):
+    monkeypatch.setattr(pictures, "find_spec", lambda name: None)
+    assert empty_map()._repr_png_() is None
+    with pytest.raises(PictureError, match=re.escape("pip install 'dubins_rrt_ros[plots]'")):
+        empty_map().plot()
+
+
+def test_progress_is_reported_every_so_many_samples_and_changes_no_path():
+    _, result, reported = recorded()
+    assert set(range(EVERY, SAMPLES, EVERY)) <= set(reported)
+    again = plan(result.problem, result.settings)
+    assert again.path == result.path and np.array_equal(again.tree.poses, result.tree.poses)
+
+
+def test_the_tree_of_a_recording_grows_up_to_the_answers():
+    recording, result, _ = recorded()
+    sizes = [len(frame.drawing.tree) for frame in recording._frames]
+    assert sizes == sorted(sizes) and 0 < sizes[0] < sizes[-1]
+    assert recording._frames[-1].samples <= result.samples
+
+
+def test_a_gif_shows_every_frame_and_ends_with_the_answer(tmp_path):
+    recording, result, _ = recorded()
+    drawn = []
+    recording.save(str(tmp_path / "search.gif"), result, drawn.append)
+    animation = Image.open(tmp_path / "search.gif")
+    assert drawn == list(range(1, len(drawn) + 1)) and len(drawn) >= SAMPLES // EVERY
+    assert 1 < animation.n_frames <= len(drawn)  # frames that show the same are one
+    first = np.array(animation.convert("RGB"))
+    animation.seek(animation.n_frames - 1)
+    last = np.array(animation.convert("RGB"))
+    orange = [int(drawing.PATH[i:i + 2], 16) for i in (1, 3, 5)]
+    assert first.shape == last.shape
+    assert (np.abs(last.astype(int) - orange) < 12).all(axis=2).sum() > 300
+
+
+def test_a_page_holds_its_frames_and_needs_no_network(tmp_path):
+    recording, result, _ = recorded(every=20)
+    recording.save(str(tmp_path / "search.html"), result)
+    page = (tmp_path / "search.html").read_text()
+    assert page.count("iVBORw0KGgo") == recording.frames - 1 and not re.search(r"https?:|src=\"", page)
+
+
+def test_a_video_is_encoded_or_ffmpeg_is_asked_for(tmp_path, monkeypatch):
+    recording, result, _ = recorded(every=20)
+    if pictures.shutil.which("ffmpeg"):
+        recording.save(str(tmp_path / "search.mp4"), result)
+        assert (tmp_path / "search.mp4").read_bytes()[4:8] == b"ftyp"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(PictureError, match="install the package ffmpeg"):
+        recording.save(str(tmp_path / "other.mp4"), result)
+
+
+def test_of_many_frames_some_are_left_out():
+    recording, _, _ = recorded(samples=2 * MOST_FRAMES, every=1)
+    assert recording.frames == MOST_FRAMES
