@@ -2,10 +2,10 @@
 
 import array
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from builtin_interfaces.msg import Time
+from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, Quaternion, Transform
 from geometry_msgs.msg import Pose as PoseMessage
@@ -120,6 +120,23 @@ def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
     return message
 
 
+def path_poses(message: PathMessage) -> np.ndarray:
+    """Return the (n, 3) poses of a path message, as x [m], y [m] and yaw [rad]; of poses that lean, as `pose_from` takes them.
+
+    Raises:
+        InvalidPose: one is not finite, or no rotation.
+    """
+    stated = [(p.position.x, p.position.y, p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w)
+              for p in map(bare_pose, message.poses)]
+    px, py, x, y, z, w = np.array(stated, dtype=float).reshape(-1, 6).T
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
+    usable = np.isfinite(px) & np.isfinite(py) & (norm >= LEAST_NORM) & (norm < math.inf)
+    if not usable.all():
+        number = int(np.argmin(usable))
+        pose_from(f"path's {number}.", message.poses[number])
+    return np.column_stack([px, py, np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)])
+
+
 def planar_rows(poses: np.ndarray) -> np.ndarray:
     """Return x, y and the quaternion's z, w of each pose, (n, 4); a message's fields take them as Python floats alone."""
     x, y, yaw = np.asarray(poses, dtype=float).reshape(-1, 3).T
@@ -194,6 +211,19 @@ def as_grid(loaded: GridMap | PolygonMap) -> GridMap:
     # The last term is for long and thin maps, where the ring of cells around counts.
     return rasterise(loaded, max(RASTER_RESOLUTION, math.sqrt(width * height / RASTER_CELLS),
                                  6 * max(width, height) / RASTER_CELLS))
+
+
+def duration_message(seconds: float) -> Duration:
+    """Return a time that has passed as a message."""
+    return Duration(sec=int(seconds), nanosec=int(seconds % 1 * 1e9))
+
+
+def filled(message: Any, **fields: Any) -> Any:
+    """Return a message with those of the fields filled that it has: other releases have others."""
+    for name, value in fields.items():
+        if hasattr(message, name):
+            setattr(message, name, value)
+    return message
 
 
 def status_message(node: str, status: Status, message: str, *, request: str = "", plan_id: int = 0, revision: int = 0,

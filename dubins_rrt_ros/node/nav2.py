@@ -4,23 +4,34 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
 from .dispatcher import Dispatcher
+from .executor_queue import ExecutorQueue
 from .frames import Frames
+from .maps import Maps
 from .nav2_action import PathAction, PathServer
+from .nav2_validity import PathValidity
 from .outputs import Outputs
 from .parameters import Parameters
 from .readiness import Readiness
 
 try:
-    from nav2_msgs.action import ComputePathToPose
+    from nav2_msgs.action import ComputePathThroughPoses, ComputePathToPose
+    from nav2_msgs.srv import IsPathValid
 except ImportError:  # part of an installation of ROS, not of the packages for pip
+    IsPathValid = None
     ACTIONS: tuple[PathAction, ...] = ()
 else:
-    ACTIONS = (PathAction(ComputePathToPose, "compute_path_to_pose", 0),)
+    ACTIONS = (PathAction(ComputePathToPose, "compute_path_to_pose", 0),
+               PathAction(ComputePathThroughPoses, "compute_path_through_poses", 100))
 
 
-def serve_nav2(node: Node, parameters: Parameters, dispatcher: Dispatcher, readiness: Readiness, frames: Frames, outputs: Outputs,
-               group: CallbackGroup) -> list[PathServer]:
-    """Serve the actions of Nav2's planner_server, or log once that they are not there, and why."""
-    if not ACTIONS:
-        node.get_logger().info("Without nav2_msgs there is no action compute_path_to_pose; for Nav2 install ros-jazzy-nav2-msgs")
-    return [PathServer(node, action, parameters, dispatcher, readiness, frames, outputs, group) for action in ACTIONS]
+class Nav2:
+    """Serves actions and service as Nav2's planner_server does, or logs once that they are not there, and why."""
+
+    def __init__(self, node: Node, parameters: Parameters, maps: Maps, readiness: Readiness, frames: Frames,
+                 dispatcher: Dispatcher, outputs: Outputs, queue: ExecutorQueue, group: CallbackGroup):
+        self._actions = [PathServer(node, action, parameters, dispatcher, readiness, frames, outputs, group)
+                         for action in ACTIONS]
+        if IsPathValid is None:
+            node.get_logger().info("Without nav2_msgs there are no actions for Nav2; to have them install ros-jazzy-nav2-msgs")
+        else:
+            self._validity = PathValidity(node, IsPathValid, parameters, maps, readiness, dispatcher, queue, group)

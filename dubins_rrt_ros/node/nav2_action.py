@@ -1,11 +1,10 @@
 """An action of Nav2's planner_server: a path over the poses of each goal."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -15,6 +14,7 @@ from rclpy.node import Node
 from dubins_rrt_ros.planning import Plan, Status
 from dubins_rrt_ros.planning.text import quoted_name
 
+from .conversions import duration_message, filled
 from .dispatcher import Dispatcher
 from .frames import Frames
 from .nav2_goals import Goal, Goals
@@ -105,7 +105,7 @@ class PathServer:
             handle.abort()
         else:
             handle.succeed()
-        return _filled(self._action.kind.Result(), planning_time=_duration(time.monotonic() - began), **fields)
+        return filled(self._action.kind.Result(), planning_time=duration_message(time.monotonic() - began), **fields)
 
     async def _planned(self, goal: Goal) -> dict[str, Any]:
         """Return the fields of the result."""
@@ -133,7 +133,9 @@ class PathServer:
         try:
             world_map = self._readiness.require_map()
             start = self._frames.pose("start", request.start) if request.use_start else self._readiness.require_start()
-            return self._dispatcher.request(plan_id, world_map, start, self._frames.pose("goal", goals[-1]))
+            waypoints = tuple(self._frames.pose(f"waypoint {n}", pose) for n, pose in enumerate(goals[:-1], 1))
+            planned = self._dispatcher.request(plan_id, world_map, start, self._frames.pose("goal", goals[-1]))
+            return replace(planned, waypoints=waypoints)
         except Exception as error:
             return RefusedRequest(plan_id, error)
 
@@ -161,15 +163,3 @@ class _Answer:
 
 def _id(handle: Any) -> bytes:
     return bytes(handle.goal_id.uuid)
-
-
-def _duration(seconds: float) -> Duration:
-    return Duration(sec=int(seconds), nanosec=int(seconds % 1 * 1e9))
-
-
-def _filled(message: Any, **fields: Any) -> Any:
-    """Fill those of the fields that a message has: other releases have others."""
-    for name, value in fields.items():
-        if hasattr(message, name):
-            setattr(message, name, value)
-    return message

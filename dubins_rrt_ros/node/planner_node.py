@@ -17,7 +17,7 @@ from .frames import Frames
 from .goal_session import GoalSession
 from .map_services import MapServices
 from .maps import Maps
-from .nav2 import serve_nav2
+from .nav2 import Nav2
 from .outcome import failures_reported, outcome_of
 from .outputs import Outputs
 from .parameters import Parameters
@@ -74,8 +74,8 @@ class PlannerNode(Node):
         # In the default group a service that awaits would keep everything else waiting.
         group = ReentrantCallbackGroup()
         self._plan_service = PlanService(self, self._dispatcher, self._readiness, self._frames, self._outputs, group)
-        self._nav2 = serve_nav2(self, self._parameters_in_use, self._dispatcher, self._readiness, self._frames, self._outputs,
-                                group)
+        self._nav2 = Nav2(self, self._parameters_in_use, self._maps, self._readiness, self._frames, self._dispatcher,
+                          self._outputs, self._queue, group)
         self._map_services = MapServices(self, self._parameters_in_use, self._maps, self._readiness, self.report_defect, group)
         self.create_service(Trigger, "~/cancel", self._on_cancel, qos_profile=SERVICE, callback_group=group)
         steady_timer(self, REMINDER_INTERVAL, self._on_reminder)

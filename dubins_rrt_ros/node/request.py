@@ -4,8 +4,10 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass, replace
+from functools import partial
 
-from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan
+from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan, plan_through
+from dubins_rrt_ros.planning.problem import Waypoint
 from dubins_rrt_ros.planning.text import one_line
 
 #: Minimum time between two reports of an improved path [s].
@@ -48,6 +50,7 @@ class PlanRequest:
         problem, settings: the arguments of plan().
         world: the problem's map, once it is prepared.
         check_invariants: True if every answer is checked, improvements too.
+        waypoints: what the path passes between the problem's start and goal.
     """
 
     id: int
@@ -55,6 +58,7 @@ class PlanRequest:
     settings: Settings
     world: Future[World]
     check_invariants: bool = False
+    waypoints: tuple[Waypoint, ...] = ()
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
         """Plan, and return the answer.
@@ -77,7 +81,8 @@ class PlanRequest:
                 if snapshot.path is not None:
                     improved(self._checked(snapshot))
 
-        return self._checked(plan(problem, self.settings, cancel=cancelled, on_progress=on_progress))
+        search = partial(plan_through, problem, self.waypoints) if self.waypoints else partial(plan, problem)
+        return self._checked(search(self.settings, cancel=cancelled, on_progress=on_progress))
 
     def _checked(self, answer: Plan) -> Plan:
         if self.check_invariants:

@@ -15,6 +15,7 @@ import shapely
 from .._kernels.collision import CollisionChecker
 from ..curves.angles import wrap
 from ..curves.dubins import WORDS
+from ..problem import Pose
 from ..vehicle import Vehicle
 from .clearance import ClearanceField
 from .raster import CLEARANCE_MARGIN
@@ -54,6 +55,11 @@ def blocked_poses(field: ClearanceField, vehicle: Vehicle, poses: np.ndarray) ->
         blocked[i] = not (_arc_is_free(checker, poses[i], steps, i) if steps.is_arc[i]
                           else _samples_are_free(checker, poses[i], poses[i + 1], float(moved[i])))
     return np.flatnonzero(blocked).tolist()
+
+
+def nearest_pose(poses: np.ndarray, pose: Pose) -> int:
+    """Return the index of the pose whose position is nearest to that of another, of equal ones the first."""
+    return int(np.argmin(np.hypot(*(poses[:, :2] - pose[:2]).T)))
 
 
 class _Steps(NamedTuple):
