@@ -46,8 +46,8 @@ def test_the_outline_counts_and_not_the_disc_around_it():
     car = Vehicle.from_footprint(TRUCK)
     assert blocked_poses(wall(), car, straight(4.6)) == []
     assert blocked_poses(wall(), car, straight(4.4)) == [5, 6, 7, 8, 9]
-    assert blocked_poses(wall(), car, straight(5.0, yaw=math.pi)) == []
-    assert blocked_poses(wall(), car, straight(5.0, yaw=math.pi / 2)) == [7, 8, 9]  # it is 2.5 m long, the gap 2 m
+    assert blocked_poses(wall(), car, straight(5.0, yaw=math.pi, begin=2.5)) == []
+    assert blocked_poses(wall(), car, straight(5.0, yaw=math.pi / 2)) == [8, 9]  # it is 2.5 m long, the gap 2 m
 
 
 def test_a_turn_on_the_spot_sweeps_what_the_vehicle_turns_through():
