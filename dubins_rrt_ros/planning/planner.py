@@ -252,7 +252,8 @@ class _Call:
         before = self._best
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and (before is None or path_cost(self._best.path) < path_cost(before.path) - LEAST_IMPROVEMENT):
-            self._tell(answer.samples, True, lambda: answer, lambda: answer.tree)
+            self._on_progress(Progress(answer.samples, answer.planning_time, answer.length, True, lambda: answer,
+                                       lambda: answer.tree))
         return answer
 
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:

@@ -68,6 +68,7 @@ def test_a_line_tells_what_plan_does(capsys):
         assert line["samples"] == answer.samples == 150 and line["vertices"] == len(answer.tree)
         assert line["map_ms"] > 0
         times, costs = zip(*line["trace"], strict=True)
+        assert 0 < line["time_to_found"] <= line["time_to_first"]
         assert [line["time_to_first"], line["first_cost"]] == line["trace"][0] and costs[-1] == line["final_cost"]
         assert (np.diff(costs) < 0).all() and (np.diff((0, *times, line["total_s"])) >= 0).all()
     said, errors = capsys.readouterr()
@@ -84,15 +85,17 @@ def test_any_number_of_processes_plans_the_same():
     assert len(by_run) == len(together) == 4
     for line in alone:
         other = by_run[line["problem"], line["seed"]]
-        assert other["path"] == line["path"] and [c for _, c in other["trace"]] == [c for _, c in line["trace"]]
+        # How many improvements in between are reported depends on the time.
+        assert other["path"] == line["path"]
+        assert (other["first_cost"], other["final_cost"]) == (line["first_cost"], line["final_cost"])
 
 
 def test_what_the_planner_refuses_is_a_line(capsys):
     walled = entry(name="walled", goal=[-0.5, 0, 0])
     lines = bench(problems(walled, entry()), *BUDGET, status=1)
     assert [line["solved"] for line in lines] == [False, True]
-    told = {"problem": "walled", "error_name": "GOAL_OCCUPIED", "time_to_first": None, "first_cost": None, "final_cost": None,
-            "trace": [], "path": [], "samples": 0, "vertices": 1}
+    told = {"problem": "walled", "error_name": "GOAL_OCCUPIED", "time_to_found": None, "time_to_first": None, "first_cost": None,
+            "final_cost": None, "trace": [], "path": [], "samples": 0, "vertices": 1}
     assert lines[0].items() >= told.items()
     assert lines[0]["message"].startswith("Goal is occupied: ")
     assert [line["found_by"] for line in lines] == ["", "hybrid_astar"]

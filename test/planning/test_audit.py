@@ -284,6 +284,39 @@ def test_of_a_large_noisy_map_every_part_of_a_path_counts():
 
 
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
+@pytest.mark.parametrize("spare, free", [(1e-3, True), (1e-6, True), (0.0, True), (-1e-5, False)])
+def test_a_kilometre_along_a_wall_takes_few_pieces(kind, spare, free):
+    """However little there is to spare, and no more looks at the time than a path that keeps clear."""
+    world_map = GridMap(np.zeros((40, 10_200)), 0.1) if kind == "grid" else PolygonMap(shapely.box(0, 0, 1020, 4))
+    start, goal = (1.0, 0.2 + spare, 0.0), (1001.0, 0.2 + spare, 0.0)
+    path = Path.of_curves(start, goal, (shortest(start, goal, 1.0),))
+    looks = []
+    verdict = audit_function(path, Problem(world_map, Vehicle(1.0, 0.2), start, goal), check_time=lambda: looks.append(0))
+    assert verdict.ok == free and len(looks) < 20
+    assert verdict.min_clearance == pytest.approx(0.2 + spare, abs=1e-9)
+
+
+def test_a_bend_along_a_round_wall_is_decided():
+    """Where a millionth of a metre is to spare all along, on a circle of 60 m."""
+    world_map = PolygonMap(shapely.Point(0, 0).buffer(10.2 + 1e-6, quad_segs=2000))
+    start = (10.0, 0.0, math.pi / 2)
+    curve = DubinsCurve(start, 10.0, "LSL", (19 * math.pi, 0.0, 0.0))
+    assert audit_function(Path.of_curves(start, curve.end, (curve,)), Problem(world_map, Vehicle(10.0, 0.2), start, curve.end)).ok
+    nearer = Vehicle(10.0, 0.2 + 1e-5)
+    assert not audit_function(Path.of_curves(start, curve.end, (curve,)), Problem(world_map, nearer, start, curve.end)).ok
+
+
+def test_the_time_is_looked_at_between_portions_of_a_path_of_many_curves():
+    count, step = 20_000, 0.01
+    curves = [DubinsCurve((i * step, 0.0, 0.0), 1.0, "LSL", (0.0, step, 0.0)) for i in range(count)]
+    start, end = (0.0, 0.0, 0.0), curves[-1].end
+    problem = Problem(GridMap(np.zeros((40, 2040)), 0.1, (-2.0, -2.0, 0.0)), Vehicle(robot_radius=0.1), start, end)
+    looks = []
+    assert audit_function(Path.of_curves(start, end, curves), problem, check_time=lambda: looks.append(0)).ok
+    assert len(looks) > 10
+
+
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_a_map_is_not_kept_alive(kind):
     map = square(kind)
     assert audit_function(Path.of_pose(START), Problem(map, Vehicle(1.0, 0.3), START, START)).ok

@@ -338,7 +338,7 @@ def bounds(map, vehicle, arcs):
                else audit_obstacles.PolygonObstacles(map.free))
     outline = audit_sweep.PolygonSweep(vehicle.footprint, squares)
     ends = [outline.clearance(*arcs.at(index, s)) for s in (begin, arcs.length)]
-    return outline.bound(arcs, index, begin, arcs.length, *ends)
+    return outline.bound(arcs, audit_sweep.Pieces(index, begin, arcs.length, *ends))
 
 
 @pytest.mark.parametrize("curvature", [0.2, -0.2, 0.0])

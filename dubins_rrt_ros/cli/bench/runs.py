@@ -94,7 +94,7 @@ def _line(run: BenchRun, answer: Plan, trace: list[list[float]], map_time: float
     return {
         "problem": run.case.name, "planner": run.label, "seed": run.settings.seed, "time_limit": run.settings.planning_time,
         "solved": solved, "error_name": answer.status.name, "message": answer.message, "found_by": answer.found_by,
-        "time_to_first": first_time, "first_cost": first_cost, "final_cost": answer.length,
+        "time_to_found": answer.time_to_found, "time_to_first": first_time, "first_cost": first_cost, "final_cost": answer.length,
         "total_s": answer.planning_time, "samples": int(answer.samples), "vertices": len(answer.tree),
         "map_ms": 1000 * map_time, "trace": trace,
         "path": answer.path.poses(_spacing(answer.problem.map)).tolist() if answer.path else [], "audit": str(answer.audit or ""),

@@ -28,6 +28,9 @@ class PolygonObstacles:
 
     def __init__(self, free: shapely.Geometry):
         self._free = free
+        shapely.prepare(free)  # each audit asks it for many points
+        #: Distances are exact up to here [m].
+        self.reach = math.inf
         corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(free)), return_index=True)
         edges = np.stack([corners[:-1], corners[1:]], axis=1)[ring[:-1] == ring[1:]]
         self._tree = shapely.STRtree(shapely.linestrings(edges))
@@ -52,11 +55,17 @@ class PolygonObstacles:
         out[inside] = _to_nearest(self._tree, _shapes(corners[inside], hull))
         return out
 
+    def near_path(self, points: np.ndarray, margin: float, reach: float, check_time: Callable[[], None] | None = None
+                  ) -> "PolygonObstacles":
+        """Return obstacles that hold those near points of a path, as `GridObstacles` does: all of them."""
+        return self
+
 
 class GridObstacles:
     """The squares of a grid's blocked cells, and what is outside the grid. Only cells near the points asked for are read."""
 
     def __init__(self, grid: GridMap, allow_unknown: bool):
+        self.grid = grid
         self._data, self._resolution, self._origin = grid.data, grid.resolution, grid.origin
         self._thresholds, self._allow_unknown = grid.thresholds, allow_unknown
         self._windows: dict[tuple[int, complex], _Window] = {}
@@ -66,8 +75,8 @@ class GridObstacles:
         x0, y0, yaw = self._origin
         rows, columns = self._data.shape
         place = (x - x0 + 1j * (y - y0)) * np.exp(-1j * yaw) / self._resolution
-        to_edge = np.min([place.real, columns - place.real, place.imag, rows - place.imag], axis=0)
-        out = np.minimum(np.where(to_edge > 0, to_edge, 0.0), reach / self._resolution)
+        to_edge = np.minimum(np.minimum(place.real, columns - place.real), np.minimum(place.imag, rows - place.imag))
+        out = np.clip(to_edge, 0.0, reach / self._resolution)
         cells, undecided = FIRST_REACH, np.flatnonzero(out)
         while len(undecided):
             out[undecided] = np.minimum(out[undecided], self._within(cells, place[undecided]))
@@ -77,6 +86,11 @@ class GridObstacles:
             cells *= 4
         distances: np.ndarray = out * self._resolution
         return distances
+
+    def near_path(self, points: np.ndarray, margin: float, reach: float, check_time: Callable[[], None] | None = None
+                  ) -> "PathsideSquares":
+        """Return the obstacles within margin and reach of points of a path, as `PathsideSquares` takes them."""
+        return PathsideSquares(self.grid, self._allow_unknown, points, margin, reach, check_time)
 
     def _within(self, reach: int, place: np.ndarray) -> np.ndarray:
         """Return the distances of points in the grid from blocked cells, in cells; infinity from `reach` on."""

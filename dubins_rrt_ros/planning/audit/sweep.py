@@ -7,18 +7,20 @@ A polygon is judged by its edges. What it sweeps is where it begins, and what it
 runs along a circle or straight on, so it stays within the sagitta of that arc from its chord, and all these chords lie in the
 convex hull of where the edge begins and where it ends. So nothing on the piece is nearer to the obstacles than that hull, less
 the sagitta, which falls with the square of the length. For the hull to be as tight as that, an edge is divided where it moves
-along itself: on either side of that point it sweeps to one side only.
+along itself: on either side of that point it sweeps to one side only. The hull of all of the polygon at both ends holds all these
+hulls: where it keeps clear, the edges need no look.
 
-Pieces are halved until the bounds decide.
+Where very many pieces of a disc's path stay undecided, as along a wall, the point in its middle is judged as such a polygon.
+
+Pieces are divided until the bounds decide.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..maps.model import GridMap
 from ..problem import Problem
 from ..vehicle import Vehicle
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
@@ -31,10 +33,14 @@ POINT = 1e-5
 TOUCH = 3 * CONTACT
 #: Absolute [m] and relative error of the least clearance; the larger one counts.
 PRECISION, SHARE = 1e-3, 0.02
-#: Number of open pieces above which the clearance is undecidable, as of a path that grazes obstacles all along.
-MOST_PIECES = 500_000
-#: Approximate number of pieces that a path is cut into at first.
-FIRST_PIECES = 64
+#: Number of pieces after which the clearance counts as undecidable, as of a path that grazes curved walls all along.
+MOST_PIECES = 4_000_000
+#: Approximate number of pieces that a path is cut into at first, and maximum number of parts that an undecided piece is cut into.
+FIRST_PIECES, PARTS = 48, 12
+#: Maximum number of pieces that are judged at once, for the sake of memory and of the time.
+AT_ONCE = 4096
+#: Number of undecided pieces of a disc's path from which on they are judged by their chords.
+MANY = 1024
 #: Number of cells around a polygon within which obstacles are sought at first.
 FIRST_CELLS = 24
 #: Distance within which obstacles are sought at first around a disc, in required clearances and at least [m].
@@ -63,8 +69,7 @@ class Arcs:
     def pieces(self, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cut each arc into pieces of one size, at most `longest`; return the indices of their arcs, their begins and sizes."""
         count = np.maximum(np.ceil(self.length / longest), 1).astype(int)
-        index = np.repeat(np.arange(len(count)), count)
-        nth = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
+        index, nth = _counted(count)
         size = (self.length / count)[index]
         return index, nth * size, size
 
@@ -108,19 +113,19 @@ _Least = tuple[float, tuple[float, float], bool]
 def _least_clearance(arcs: Arcs, problem: Problem, required_clearance: float, obstacles: Obstacles | None,
                      check_time: Callable[[], None]) -> _Least:
     """Return the least clearance, where it is, and whether no piece can hide contact."""
-    world_map, unknown, footprint = problem.map, problem.allow_unknown, problem.vehicle.footprint
+    obstacles = obstacles or obstacles_of(problem.map, problem.allow_unknown)
+    footprint = problem.vehicle.footprint
     if not footprint:
-        return _least_of_disc(arcs, obstacles or obstacles_of(world_map, unknown), required_clearance, check_time)
-    if not isinstance(world_map, GridMap):
-        polygons = obstacles if isinstance(obstacles, PolygonObstacles) else PolygonObstacles(world_map.free)
-        return _bisect(arcs, PolygonSweep(footprint, polygons), required_clearance, check_time)
-    reach = FIRST_CELLS * world_map.resolution
+        return _least_of_disc(arcs, obstacles, required_clearance, check_time)
+    if isinstance(obstacles, PolygonObstacles):
+        return _refine(arcs, PolygonSweep(footprint, obstacles), required_clearance, check_time)
+    reach = FIRST_CELLS * obstacles.grid.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)
     x, y, _ = arcs.at(index, begin)
     while True:
-        squares = PathsideSquares(world_map, unknown, x + 1j * y, problem.vehicle.robot_radius + spacing, reach, check_time)
-        found = _bisect(arcs, PolygonSweep(footprint, squares), required_clearance, check_time)
+        squares = obstacles.near_path(x + 1j * y, problem.vehicle.robot_radius + spacing, reach, check_time)
+        found = _refine(arcs, PolygonSweep(footprint, squares), required_clearance, check_time)
         if found[0] < squares.reach:
             return found
         reach *= 4
@@ -130,10 +135,44 @@ def _least_of_disc(arcs: Arcs, obstacles: Obstacles, required_clearance: float, 
     """Return what `_least_clearance` does, for a disc: obstacles far away are left out, unless there are no others."""
     reach = max(FIRST_REACH * required_clearance, LEAST_REACH)
     while True:
-        found = _bisect(arcs, DiscSweep(obstacles, reach), required_clearance, check_time)
+        found = _refine(arcs, DiscSweep(obstacles, reach), required_clearance, check_time)
         if found[0] < reach:
             return found
         reach *= 8
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of arcs as arrays: the indices of their arcs, their begins and sizes, and the clearances at both ends [m]."""
+
+    index: np.ndarray
+    begin: np.ndarray
+    size: np.ndarray
+    at_begin: np.ndarray
+    at_end: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def __getitem__(self, chosen: np.ndarray | slice) -> "Pieces":
+        return Pieces(*(a[chosen] for a in (self.index, self.begin, self.size, self.at_begin, self.at_end)))
+
+    def divided(self, least: "_LeastFound", parts: np.ndarray) -> "Pieces":
+        """Return them, each cut into (n,) `parts`, whose ends are measured."""
+        piece, nth = _counted(parts)
+        size = (self.size / parts)[piece]
+        index, begin, at_begin = self.index[piece], self.begin[piece] + nth * size, self.at_begin[piece]
+        inner = nth > 0
+        at_begin[inner] = least.measure(index[inner], begin[inner])
+        at_end = np.roll(at_begin, -1)
+        at_end[np.cumsum(parts) - 1] = self.at_end
+        return Pieces(index, begin, size, at_begin, at_end)
+
+
+def _counted(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return each index as often as its count says, and beside it 0, 1, ... up to the count."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 class DiscSweep:
@@ -150,39 +189,69 @@ class DiscSweep:
         """Return the clearance at poses [m]."""
         return self._obstacles.distance(x, y, self.reach)
 
-    def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
-              at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
-        """Return lower bounds of the clearance on pieces, given the clearances at both ends of each."""
-        bounds: np.ndarray = (at_begin + at_end - size) / 2
+    def bound(self, arcs: Arcs, pieces: Pieces, enough: float = math.inf) -> np.ndarray:
+        """Return lower bounds of the clearance on pieces; those above `enough` [m] need not be close."""
+        bounds: np.ndarray = (pieces.at_begin + pieces.at_end - pieces.size) / 2
+        low = np.flatnonzero(bounds < enough)
+        if len(low) >= MANY:
+            bounds[low] = np.maximum(bounds[low], self._bound_by_chords(arcs, pieces[low], enough))
         return bounds
+
+    def parts(self, pieces: Pieces, enough: float) -> np.ndarray:
+        """Return the numbers of parts that pieces are cut into: as many as suffice if the clearance is even in between."""
+        room = pieces.at_begin + pieces.at_end - 2 * enough
+        return np.asarray(np.ceil(pieces.size / np.maximum(room, pieces.size / PARTS)).clip(2, PARTS).astype(int))
+
+    def _bound_by_chords(self, arcs: Arcs, pieces: Pieces, enough: float) -> np.ndarray:
+        x, y, _ = arcs.at(pieces.index, pieces.begin)
+        reach = float(min(enough + pieces.size.max(), self.reach))
+        obstacles = self._obstacles.near_path(x + 1j * y, float(pieces.size.max()), reach)
+        return PolygonSweep(((0.0, 0.0),), obstacles).bound(arcs, pieces, enough)
 
 
 class PolygonSweep:
     """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor."""
 
-    def __init__(self, corners: tuple[tuple[float, float], ...], obstacles: PolygonObstacles | PathsideSquares):
+    def __init__(self, corners: Sequence[tuple[float, float]], obstacles: PolygonObstacles | PathsideSquares):
         self._corners = np.array([complex(*corner) for corner in corners])
         self._obstacles = obstacles
 
     def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return the clearance at poses [m]."""
-        return self._obstacles.shape_distance((x + 1j * y)[:, None] + np.exp(1j * theta)[:, None] * self._corners)
+        return self._obstacles.shape_distance(self._placed(x, y, theta, self._corners))
 
-    def bound(self, arcs: Arcs, index: np.ndarray, begin: np.ndarray, size: np.ndarray,
-              at_begin: np.ndarray, at_end: np.ndarray) -> np.ndarray:
-        """Return lower bounds of the clearance on pieces, given the clearances at both ends of each."""
-        curvature = arcs.curvature[index]
-        piece, edges = self._edges(curvature)
-        corners = []
-        for s in (begin, begin + size):
-            x, y, theta = arcs.at(index, s)
-            corners.append((x + 1j * y)[piece, None] + np.exp(1j * theta)[piece, None] * edges)
-        swept = self._obstacles.shape_distance(np.concatenate(corners, axis=1), hull=True)
+    def bound(self, arcs: Arcs, pieces: Pieces, enough: float = math.inf) -> np.ndarray:
+        """Return lower bounds of the clearance on pieces; those above `enough` [m] need not be close."""
+        curvature = arcs.curvature[pieces.index]
         # A circle's arc that turns by an angle a has the sagitta r (1 - cos(a / 2)), which is at most r a^2 / 8.
         speed: np.ndarray = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
-        sagitta = speed * np.abs(curvature) * size**2 / 8
-        bounds: np.ndarray = np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(index)))) - sagitta
-        return np.asarray(np.minimum(at_begin, bounds))
+        sagitta = speed * np.abs(curvature) * pieces.size**2 / 8
+        bounds = self._swept(arcs, pieces, self._corners) - sagitta
+        low = np.flatnonzero(bounds < enough) if len(self._corners) > 1 else np.empty(0, int)
+        if len(low):
+            bounds[low] = self._bound_by_edges(arcs, pieces[low]) - sagitta[low]
+        return np.asarray(np.minimum(pieces.at_begin, bounds))
+
+    def parts(self, pieces: Pieces, enough: float) -> np.ndarray:
+        """Return the numbers of parts that pieces are cut into, two each, as the error falls with the square of the size."""
+        return np.full(len(pieces), 2)
+
+    def _bound_by_edges(self, arcs: Arcs, pieces: Pieces) -> np.ndarray:
+        """Return the least distances of the hulls of the edges."""
+        piece, edges = self._edges(arcs.curvature[pieces.index])
+        swept = self._swept(arcs, pieces[piece], edges)
+        return np.asarray(np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(pieces)))))
+
+    def _swept(self, arcs: Arcs, pieces: Pieces, points: np.ndarray) -> np.ndarray:
+        """Return the distances of the hulls of where points of the vehicle are at both ends of pieces."""
+        ends = [self._placed(*arcs.at(pieces.index, s), points) for s in (pieces.begin, pieces.begin + pieces.size)]
+        return np.asarray(self._obstacles.shape_distance(np.concatenate(ends, axis=1), hull=True))
+
+    @staticmethod
+    def _placed(x: np.ndarray, y: np.ndarray, theta: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return where points of the vehicle, the same or others of each pose, are at poses."""
+        placed: np.ndarray = (x + 1j * y)[:, None] + np.exp(1j * theta)[:, None] * points
+        return placed
 
     def _edges(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the edges, in the vehicle's frame, divided where they move along themselves while it drives with the curvatures.
@@ -225,25 +294,36 @@ class _LeastFound:
         return found
 
 
-def _bisect(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
-    """Halve the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
+def _refine(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
+    """Divide the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
     least = _LeastFound(arcs, vehicle)
+    waiting, judged = _first_pieces(arcs, least, check_time), 0
+    while waiting and judged <= MOST_PIECES and least.clearance >= required_clearance - CONTACT:
+        check_time()
+        pieces = waiting.pop()
+        judged += len(pieces)
+        enough = max(required_clearance - 2 * CONTACT, least.clearance - max(PRECISION, SHARE * least.clearance))
+        undecided = pieces[vehicle.bound(arcs, pieces, enough) < enough]
+        for first in range(0, len(undecided), AT_ONCE // PARTS):
+            some = undecided[first:first + AT_ONCE // PARTS]
+            waiting.append(some.divided(least, vehicle.parts(some, enough)))
+    return least.clearance, least.place, judged <= MOST_PIECES
+
+
+def _first_pieces(arcs: Arcs, least: _LeastFound, check_time: Callable[[], None]) -> list[Pieces]:
+    """Return the pieces that a path is cut into at first, in portions."""
     index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
+    return [_with_ends(index[first:first + AT_ONCE], begin[first:first + AT_ONCE], size[first:first + AT_ONCE], least, check_time)
+            for first in range(0, len(index), AT_ONCE)]
+
+
+def _with_ends(index: np.ndarray, begin: np.ndarray, size: np.ndarray, least: _LeastFound, check_time: Callable[[], None]
+               ) -> Pieces:
+    """Return pieces, whose ends are measured."""
+    check_time()
     # A piece ends where the next begins, but for the last of an arc.
     last = np.append(index[1:] != index[:-1], True)
-    found = least.measure(np.append(index, index[last]), np.append(begin, arcs.length))
-    at_begin, at_ends = np.split(found, [len(index)])
-    at_end = np.roll(at_begin, -1)
-    at_end[last] = at_ends
-    while 0 < len(index) <= MOST_PIECES and least.clearance >= required_clearance - CONTACT:
-        check_time()
-        bound = vehicle.bound(arcs, index, begin, size, at_begin, at_end)
-        is_open = ((bound < required_clearance - 2 * CONTACT)
-                   | (bound < least.clearance - max(PRECISION, SHARE * least.clearance)))
-        index, begin, size, at_begin, at_end = (a[is_open] for a in (index, begin, size / 2, at_begin, at_end))
-        if len(index):
-            at_middle = least.measure(index, begin + size)
-            begin = np.concatenate([begin, begin + size])
-            at_begin, at_end = np.concatenate([at_begin, at_middle]), np.concatenate([at_middle, at_end])
-            index, size = np.tile(index, 2), np.tile(size, 2)
-    return least.clearance, least.place, len(index) <= MOST_PIECES
+    found = least.measure(np.append(index, index[last]), np.append(begin, begin[last] + size[last]))
+    at_end = np.roll(found[:len(index)], -1)
+    at_end[last] = found[len(index):]
+    return Pieces(index, begin, size, found[:len(index)], at_end)

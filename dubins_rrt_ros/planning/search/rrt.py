@@ -43,6 +43,7 @@ from .cost import path_cost
 from .cost_bounds import CostBounds
 from .cost_to_go import CostToGo
 from .hybrid_astar import HybridAStarRuns
+from .lower_bound import lower_bound
 from .sampling import Sampler
 from .smoothing import Smoother
 from .tree import Tree, path_to
@@ -63,6 +64,9 @@ BACKGROUND_EXPANSIONS, BACKGROUND_EXPANSIONS_OF_POLYGON = 1024, 128
 WITHOUT_PATH = 16
 #: Number of rounds of smoothing for the first path.
 ROUNDS = 3
+#: Maximum cost of a path that is ready after the first round, relative to the way around the obstacles, and its maximum number of
+#: curves: a longer one may lead the wrong way round, and one with more curves gains by the next rounds.
+EARLY_COST, EARLY_CURVES = 1.15, 12
 #: Time for which results from the background are waited for before the time is looked at [s].
 WAIT = 0.002
 #: Time that must be left for a bound to be computed here where the background has not begun it yet [s].
@@ -160,9 +164,9 @@ class Search:
             self._start_bounds()
         elif self._runs:
             yield from self._find_first_path(self._runs)
-            self._start_bounds()
             if self.best >= 0:
                 yield from self._improve_first_path(self._runs)
+            self._start_bounds()
         batch = FIRST_BATCH
         while not self.done:
             batch = yield from self._take_block(batch)
@@ -205,11 +209,20 @@ class Search:
         """Smooth the first path, look once for a better one where RRT* goes on, and smooth the best."""
         rounds = range(ROUNDS if self._settings.shortcut else 0)
         yield from self._smooth(rounds[:1])
+        self.ready = self._is_nearly_best()
+        yield self._may_end(smoothing_is_due=True)
+        self._start_bounds()
         if not self._is_rrt:
             yield from self._find_better_path(runs)
         yield from self._smooth(rounds[1:])
         self.ready = True
         yield self._may_end()
+
+    def _is_nearly_best(self) -> bool:
+        """Return True if the best path is most likely so near to the shortest that it need not wait for what is found next."""
+        path, to_goal = self.path, self._bounds.to_goal if self._bounds else None
+        return (path is not None and len(path.words) <= EARLY_CURVES + 1
+                and self.cost <= EARLY_COST * lower_bound(self._problem, to_goal))
 
     def _find_better_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
         """Run hybrid A* once more, as far as its run ends soon."""
