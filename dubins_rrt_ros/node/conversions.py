@@ -22,6 +22,8 @@ from dubins_rrt_ros.planning.text import one_line, quoted_name
 LEAST_NORM, DOUBTFUL_NORM = 1e-3, 0.1
 #: Minimum angle between a pose's x axis and the vertical [rad]: nearer it has no heading in the plane.
 LEAST_ANGLE_TO_VERTICAL = math.radians(1)
+#: Maximum difference between two poses that count as equal [m, and of a quaternion's components].
+EQUAL_POSES = 1e-6
 #: Angle between a pose's z axis and the vertical beyond which it is doubtful [rad].
 DOUBTFUL_TILT = math.radians(10)
 #: Maximum angle between the z axis of a map and the vertical [rad]: further, distances would be wrong.
@@ -69,6 +71,14 @@ def doubts_about(name: str, message: PoseMessage) -> dict[str, str]:
         doubts["tilt"] = (f"The {name} pose leans by {math.degrees(tilt):.3g} degrees; the direction of its x axis in the plane "
                           "is taken as its yaw.")
     return doubts
+
+
+def are_equal(one: PoseStamped, other: PoseStamped) -> bool:
+    """Return True if two poses are the same in the same frame, but for rounding."""
+    numbers = [[getattr(part, axis) for part in (message.pose.position, message.pose.orientation)
+                for axis in part.get_fields_and_field_types()] for message in (one, other)]
+    return one.header.frame_id == other.header.frame_id and all(
+        abs(a - b) <= EQUAL_POSES for a, b in zip(*numbers, strict=True))
 
 
 def pose_message(pose: Pose) -> PoseMessage:

@@ -14,13 +14,13 @@ from .executor_queue import ExecutorQueue
 from .maps import Maps
 from .outcome import Outcome, outcome_of
 from .parameters import Parameters
-from .request import PlanRequest, RefusedRequest
+from .request import PlanRequest, RefusedRequest, Route
 from .worker import Job, Worker
 
-#: Called in the executor's thread with the id of a request and its outcome.
-OnEnd = Callable[[int, Outcome], None]
-#: Called there with the id of a request and its best plan so far.
-OnImprovement = Callable[[int, Plan], None]
+#: Called in the executor's thread with the outcome of a request.
+OnEnd = Callable[[Outcome], None]
+#: Called there with the best plan of a request so far.
+OnImprovement = Callable[[Plan], None]
 #: Time that each worker gets to act on its cancellation at shutdown [s].
 SHUTDOWN_TIMEOUT = 0.2
 
@@ -51,7 +51,7 @@ class Dispatcher:
         self._workers: list[Worker] = []
         self.goals, self.services = self.new_worker("goals"), self.new_worker("services")
         self._newest_id = 0
-        self._under_way: dict[int, Submission] = {}
+        self._under_way: dict[Future, Submission] = {}
 
     @property
     def any_goal_heading(self) -> bool:
@@ -68,22 +68,20 @@ class Dispatcher:
         self._newest_id += 1
         return self._newest_id
 
-    def request(self, plan_id: int, world_map: Map, start: Pose, goal: Pose, **options: Any) -> PlanRequest:
+    def request(self, world_map: Map, locate: Callable[[], Route], **options: Any) -> PlanRequest:
         """Make a request.
 
         Args:
-            plan_id: from `new_id`.
             world_map: the newest map.
-            start, goal: in its frame.
+            locate: as in `PlanRequest`; called in the worker's thread.
             options: of `Problem`, where they differ from the parameters.
-
-        Raises:
-            OptionError: an option is out of range.
-            InvalidPose: a pose cannot be used.
         """
         now = self._parameters.read()
-        problem = Problem(world_map, now.vehicle, start, goal, **{**now.problem, **options})
-        return PlanRequest(plan_id, problem, now.settings, self._maps.world_for_request(), now.node.check_invariants)
+
+        def problem(start: Pose, goal: Pose) -> Problem:
+            return Problem(world_map, now.vehicle, start, goal, **{**now.problem, **options})
+
+        return PlanRequest(locate, problem, now.settings, self._maps.world_for_request(), now.node.check_invariants)
 
     def submit(self, worker: Worker, request: PlanRequest | RefusedRequest, on_end: OnEnd,
                on_improvement: OnImprovement | None = None, finish: Callable[[Plan], None] | None = None) -> Submission:
@@ -96,18 +94,20 @@ class Dispatcher:
             on_improvement: called for the better paths meanwhile.
             finish: called in the worker's thread with the plan, before `on_end`: for what would keep the executor waiting.
         """
-        improved = None if on_improvement is None else partial(self._post, on_improvement, request.id)
-        job = worker.submit(partial(_serve, request, improved, finish), partial(self._post, self._end, request.id, on_end))
-        self._under_way[request.id] = submission = Submission(job, Future())
+        outcome = Future()
+        improved = None if on_improvement is None else partial(self._post, on_improvement)
+        job = worker.submit(partial(_serve, request, improved, finish), partial(self._post, self._end, outcome, on_end))
+        self._under_way[outcome] = submission = Submission(job, outcome)
         return submission
 
     def _post(self, call: Callable[..., None], *arguments: object) -> None:
         self._queue.post(partial(call, *arguments))
 
-    def _end(self, plan_id: int, on_end: OnEnd, result: Plan | Exception) -> None:
+    def _end(self, awaited: Future, on_end: OnEnd, result: Plan | Exception) -> None:
         outcome = self._maps.with_remark(outcome_of(result, self._node))
-        self._under_way.pop(plan_id).outcome.set_result(outcome)
-        on_end(plan_id, outcome)
+        del self._under_way[awaited]
+        awaited.set_result(outcome)
+        on_end(outcome)
 
     def cancel_all(self) -> list[Submission]:
         """Cancel all requests and return them; each still has an outcome."""

@@ -29,6 +29,10 @@ class Frames:
             self._buffer = tf2_ros.Buffer()
             self._listener = tf2_ros.TransformListener(self._buffer, node)
 
+    def is_global(self, frame: str) -> bool:
+        """Return True if poses in this frame need no transform."""
+        return frame in ("", self._frame)
+
     def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped, any_heading: bool = False) -> Pose:
         """Return the (x, y, yaw) of a message's pose in the global frame.
 
@@ -63,14 +67,14 @@ class Frames:
 
     def _latest(self, name: str, frame: str) -> Transform:
         if frame.startswith("/"):
-            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or")
+            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or", True)
         if tf2_ros is None:
-            raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or")
+            raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or", True)
         try:
             return self._buffer.lookup_transform(self._frame, frame, Time()).transform
         except tf2_ros.TransformException as error:
             raise self._refusal(name, frame, f"{' '.join(str(error).split()).rstrip('.')}; publish that transform, or") from None
 
-    def _refusal(self, name: str, frame: str, why: str) -> Refusal:
+    def _refusal(self, name: str, frame: str, why: str, is_final: bool = False) -> Refusal:
         return Refusal(Status.TF_ERROR, f"The {name} pose is in frame {quoted_name(frame)} and cannot be transformed to "
-                                        f"'{self._frame}': {why} publish the pose in '{self._frame}'.")
+                                        f"'{self._frame}': {why} publish the pose in '{self._frame}'.", is_final)

@@ -1,117 +1,315 @@
-"""The goal that came by topic: from its arrival to its last path."""
+"""The goal that came by topic, which stands until it is reached, cancelled or replaced."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from functools import partial
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
+from rclpy.timer import Timer
 
-from dubins_rrt_ros.planning import Audit, Plan, Status
+from dubins_rrt_ros.planning import Audit, Plan, Pose, Status
+from dubins_rrt_ros.planning.curves.angles import heading_error, position_error
+from dubins_rrt_ros.planning.curves.progress import PathProgress
 
-from .dispatcher import Dispatcher, Submission
+from .conversions import are_equal
+from .dispatcher import Dispatcher
 from .executor_queue import steady_timer
 from .frames import Frames
 from .outcome import Outcome, failures_reported
 from .outputs import Outputs
+from .parameters import Parameters
 from .path_check import PathCheck
 from .readiness import Readiness
+from .request import Route
+from .worker import Job
 
-#: Time that a goal waits for a start [s]: one that was sent just before may still be under way, as topics keep no common order.
-START_GRACE = 0.5
+#: Time between two attempts where a transform is waited for [s]: nothing tells that one has come.
+TRANSFORM_INTERVAL = 0.5
+
+
+class _Purpose(Enum):
+    """The reason for a request: what of it is told depends on it."""
+
+    GOAL = auto()  # a goal that came, or one whose path is broken: all is told
+    RETRY = auto()  # a failure that may be cured: all but the same failure again
+    REPLAN = auto()  # a path is on display: only one that replaces it
+
+
+@dataclass(eq=False)
+class _Request:
+    """A request to the goal.
+
+    Attributes:
+        purpose: why it was made.
+        job: cancels it.
+        has_path: True once a path of it was published.
+        came: the inputs that came meanwhile, of those that can cure a failure.
+    """
+
+    purpose: _Purpose
+    job: Job | None = None
+    has_path: bool = False
+    came: set[str] = field(default_factory=set)
 
 
 class GoalSession:
-    """Plans to the newest goal and publishes the answers; those to older goals are dropped."""
+    """Plans to the newest goal and publishes the answers; those to older goals are dropped.
 
-    def __init__(self, node: Node, dispatcher: Dispatcher, readiness: Readiness, frames: Frames, outputs: Outputs,
-                 path_check: PathCheck):
-        self._node, self._dispatcher, self._readiness = node, dispatcher, readiness
+    A newer goal waits until the request under way has a first path or none, and of the waiting ones only the newest is kept:
+    goals that come faster than paths are found would else cancel each other for ever.
+    """
+
+    def __init__(self, node: Node, parameters: Parameters, dispatcher: Dispatcher, readiness: Readiness, frames: Frames,
+                 outputs: Outputs, path_check: PathCheck):
+        self._node, self._parameters, self._dispatcher, self._readiness = node, parameters, dispatcher, readiness
         self._frames, self._outputs, self._path_check = frames, outputs, path_check
         self._goal: PoseStamped | None = None  # None again once it is cancelled
-        self._plan_id = 0  # of the newest request to it
-        self._revision = 0  # of the newest answer to that
-        self._submission: Submission | None = None  # while it is planned
-        self._grace = steady_timer(node, START_GRACE, self._plan)  # runs while it waits for a start
-        self._grace.cancel()
+        self._request: _Request | None = None  # that is under way
+        self._plan_id = self._revision = 0  # of the newest answer
+        self._waiting: tuple[PoseStamped, int] | None = None  # a newer goal, and its plan_id
+        self._patience = self._timer(self._begin_waiting)  # runs meanwhile
+        self._failure: Outcome | None = None  # of the last request, where something can cure it
+        self._retry_timer = self._timer(partial(self._retry, "transform"))  # runs while a transform can
+        self._progress: PathProgress | None = None  # along the path on display
+        self._is_reached = False
+        self._map_changed = False  # while it was planned again
+        self._replan_timer = self._timer(self._replan)  # runs while the goal is pursued, where it is planned again at a rate
+
+    def _timer(self, callback: Callable[[], None]) -> Timer:
+        timer = steady_timer(self._node, TRANSFORM_INTERVAL, callback)
+        timer.cancel()
+        return timer
 
     @property
     def is_planning(self) -> bool:
-        """True while a worker plans to the goal."""
-        return self._submission is not None
+        """True while a worker plans to the goal, or it waits for a start that may be under way."""
+        return self._request is not None
 
-    @property
-    def waits_for_start(self) -> bool:
-        """True while the goal waits for a start that may be under way."""
-        return not self._grace.is_canceled()
+    # What comes
 
     def take(self, goal: PoseStamped) -> None:
-        """Plan to this goal, which replaces the one before."""
-        self._begin(goal)
-        if self._readiness.lacks_start_alone:
-            self._grace.reset()
+        """Plan to this goal, which replaces the one before, once that has a first path or none."""
+        awaited = self._awaited_request
+        if awaited is not None and self._goal is not None and self._are_equal(goal, self._goal):
+            self._drop_waiting()
+        elif awaited is not None and not awaited.has_path:
+            if self._waiting is None:
+                _restart(self._patience, self._parameters.read().settings.planning_time)
+            self._waiting = goal, self._dispatcher.new_id()
         else:
-            self._plan()
+            self._begin(goal, self._dispatcher.new_id())
 
-    def start_came(self) -> None:
-        """Plan, if the goal waited for a start."""
-        if self.waits_for_start:
-            self._plan()
+    def start_came(self, start: Pose) -> None:
+        """Follow the vehicle along the path on display, and try again what another start can cure."""
+        self._follow(start)
+        self._retry("start")
+
+    def map_came(self) -> None:
+        """Try again what the newest map, which is prepared, can cure; else check the published path against it."""
+        self._retry("map")
+        self._check_path()
 
     def cancel(self) -> str:
-        """Give up the goal, so that a changed map does not bring it back. A request under way is cancelled by the dispatcher.
+        """Give up the goal, so that nothing brings it back. A request under way is cancelled by the dispatcher.
 
         Returns:
-            A sentence where the goal waited for a start, which is answered then; else "".
+            A sentence where the goal waited for what can cure its failure, which is answered then; else "".
         """
-        self._goal = None
-        if not self.waits_for_start:
+        failure, self._goal = self._failure, None
+        self._forget_failure()
+        if self._waiting is not None:
+            message = "Cancelled before a first path: it waited for that of the goal before."
+            self._report(Outcome(Status.CANCELLED, message), plan_id=self._waiting[1], revision=1)
+        self._drop_waiting()
+        self._replan_timer.cancel()
+        if self._request is not None and self._request.purpose is _Purpose.REPLAN:
+            self._request = None  # nothing of it was told
+        if failure is None or self.is_planning:
             return ""
-        self._grace.cancel()
-        message = "Cancelled before a first path: the goal waited for a start."
+        message = f"Cancelled before a first path: the goal waited for a {failure.cure}."
         self._answer(Outcome(Status.CANCELLED, message))
         return message
 
-    def check_path(self) -> None:
-        """See whether the published path is free on the newest map; it is withdrawn, and planned again, where it is not."""
-        self._path_check.begin(lambda: not self.is_planning, self._replace_path)
+    # Requests
 
-    def _begin(self, goal: PoseStamped) -> None:
-        """Make a request to this goal the only one that counts."""
-        if self._submission is not None:
-            self._submission.job.cancel()
-            self._submission = None
-        self._goal, self._plan_id, self._revision = goal, self._dispatcher.new_id(), 0
+    @property
+    def _awaited_request(self) -> _Request | None:
+        """The request under way, if all of it is told: whoever sends a goal has an answer, and others may end without one."""
+        return self._request if self._request is not None and self._request.purpose is _Purpose.GOAL else None
 
-    def _plan(self) -> None:
-        self._grace.cancel()
-        with failures_reported(self._node, self._answer):
-            world_map, start = self._readiness.require_map(), self._readiness.require_start()
-            goal = self._frames.pose("goal", self._goal, self._dispatcher.any_goal_heading)
-            request = self._dispatcher.request(self._plan_id, world_map, start, goal)
-            if not request.world.done():
+    def _are_equal(self, goal: PoseStamped, other: PoseStamped) -> bool:
+        """Return True if two goals are the same place; in a frame that may move they are only at the same time."""
+        moves = not self._frames.is_global(goal.header.frame_id)
+        return are_equal(goal, other) and not (moves and goal.header.stamp != other.header.stamp)
+
+    def _begin_waiting(self) -> None:
+        """Plan to the goal that waits, if there is one."""
+        if self._waiting is not None:
+            self._begin(*self._waiting)
+
+    def _drop_waiting(self) -> None:
+        self._waiting = None
+        self._patience.cancel()
+
+    def _begin(self, goal: PoseStamped, plan_id: int) -> None:
+        """Make this the goal that counts."""
+        self._goal, self._is_reached = goal, False
+        self._forget_failure()
+        self._drop_waiting()
+        self._plan(_Purpose.GOAL, plan_id)
+
+    def _plan(self, purpose: _Purpose, plan_id: int = 0) -> None:
+        """Plan to the goal, with a new plan_id if one is given; nothing of a request under way is told any more."""
+        if self._request is not None and self._request.job is not None:
+            self._request.job.cancel()
+        self._request = None
+        if plan_id:
+            self._plan_id, self._revision = plan_id, 0
+        request = _Request(purpose)
+        with failures_reported(self._node, partial(self._conclude, request)):
+            locate = partial(self._locate, self._goal, self._dispatcher.any_goal_heading)
+            planned = self._dispatcher.request(self._readiness.require_map(), locate)
+            if purpose is _Purpose.GOAL and not planned.world.done():
                 self._node.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
-            self._submission = self._dispatcher.submit(self._dispatcher.goals, request, self._end, self._improve)
+            improve = None if self._parameters.read().node.publish == "final" else partial(self._improve, request)
+            request.job = self._dispatcher.submit(self._dispatcher.goals, planned, partial(self._end, request), improve).job
+            self._request = request
 
-    def _improve(self, plan_id: int, plan: Plan) -> None:
-        if plan_id == self._plan_id:
-            with failures_reported(self._node, self._answer):
-                self._answer(Outcome(plan.status, plan.message, plan), last=False)
+    def _locate(self, goal: PoseStamped, any_heading: bool) -> Route:
+        # In a worker's thread.
+        return Route(self._readiness.require_start(), self._frames.pose("goal", goal, any_heading))
 
-    def _end(self, plan_id: int, outcome: Outcome) -> None:
-        if plan_id == self._plan_id:
-            self._submission = None
+    def _improve(self, request: _Request, plan: Plan) -> None:
+        if request is self._request and self._is_wanted(request, plan):
             with failures_reported(self._node, self._answer):
-                self._answer(outcome)
-            self.check_path()
+                self._publish(request, Outcome(plan.status, plan.message, plan), last=False)
+            self._begin_waiting()
+
+    def _end(self, request: _Request, outcome: Outcome) -> None:
+        if request is self._request:
+            self._request = None
+            with failures_reported(self._node, partial(self._conclude, request)):
+                self._conclude(request, outcome)
+            self._begin_waiting()
+            for cure in request.came:
+                self._retry(cure)
+            self._check_path()
+            if self._map_changed:
+                self._replan()
+
+    def _conclude(self, request: _Request, outcome: Outcome) -> None:
+        """Publish the end of a request; a failure that something can cure waits for that, and is told once."""
+        if self._is_wanted(request, outcome.plan) and not self._is_known(request, outcome):
+            self._publish(request, outcome)
+            self._wait_for_cure(outcome)
+        if self._goal is not None and (rate := self._parameters.read().node.replan_rate) and self._replan_timer.is_canceled():
+            _restart(self._replan_timer, 1 / rate)
+
+    def _is_known(self, request: _Request, outcome: Outcome) -> bool:
+        return request.purpose is _Purpose.RETRY and self._failure is not None and outcome.status is self._failure.status
+
+    def _publish(self, request: _Request, outcome: Outcome, last: bool = True) -> None:
+        if request.purpose is _Purpose.REPLAN and not request.has_path:
+            self._plan_id, self._revision = self._dispatcher.new_id(), 0
+        request.has_path = True
+        self._answer(outcome, last)
 
     def _answer(self, outcome: Outcome, last: bool = True) -> None:
         self._revision += 1
         self._outputs.answer(outcome, last=last, plan_id=self._plan_id, revision=self._revision, map_id=self._readiness.map_id)
+        path = outcome.plan and outcome.plan.path
+        self._progress = PathProgress(path) if path else None
+        if self._readiness.start is not None:
+            self._follow(self._readiness.start)
 
-    def _replace_path(self, verdict: Audit) -> None:
-        message = f"The map changed, and the published path is not free on it: {'; '.join(verdict.findings)}. It is withdrawn"
-        if self.waits_for_start:  # a newer goal
-            self._outputs.withdraw()
+    def _warn(self, status: Status, message: str) -> None:
+        self._revision += 1
+        self._report(Outcome(status, message, is_warning=True), self._plan_id, self._revision)
+
+    def _report(self, outcome: Outcome, plan_id: int, revision: int) -> None:
+        """Publish an event that changes no path."""
+        self._outputs.report(outcome, request="goal", plan_id=plan_id, revision=revision, map_id=self._readiness.map_id)
+
+    # Failures, and what can cure them
+
+    def _wait_for_cure(self, outcome: Outcome) -> None:
+        self._forget_failure()
+        if self._goal is not None and outcome.cure:
+            self._failure = outcome
+            self._warn(outcome.status, f"Waiting for a {outcome.cure}: the goal stands, and is planned again when one comes.")
+            if "transform" in outcome.cure:
+                _restart(self._retry_timer, TRANSFORM_INTERVAL)
+
+    def _forget_failure(self) -> None:
+        self._failure = None
+        self._retry_timer.cancel()
+
+    def _retry(self, cure: str) -> None:
+        """Plan again where this can cure the failure; if a request is under way, once that has failed."""
+        if self._request is not None:
+            self._request.came.add(cure)
+        elif self._failure is not None and cure in self._failure.cure:
+            self._plan(_Purpose.RETRY)
+
+    # The path on display
+
+    def _follow(self, start: Pose) -> None:
+        if self._progress is None or self._outputs.shown is None:
+            return
+        self._progress.advance(start)
+        limits, goal = self._parameters.read().node, self._outputs.shown.problem.goal
+        self._is_reached |= (position_error(start, goal) <= limits.goal_reached_xy
+                             and heading_error(start, goal) <= limits.goal_reached_yaw)
+
+    def _is_wanted(self, request: _Request, plan: Plan | None) -> bool:
+        """Return True if the answer to a request is to be told.
+
+        A path that nobody asked for is, where it is better than the rest of the one on display, or the vehicle has left that.
+        """
+        if request.purpose is not _Purpose.REPLAN or request.has_path or self._progress is None:
+            return True
+        if plan is None or plan.path is None:
+            return False
+        gain = self._parameters.read().node.replan_gain
+        return (plan.path.length < (1 - gain) * self._progress.left
+                or self._progress.distance > plan.problem.vehicle.turning_radius)
+
+    def _check_path(self) -> None:
+        """See whether what is left of the published path is free on the newest map; it is planned again, whether or not."""
+        progress = self._progress
+        if progress is not None and not self._is_reached:
+            self._path_check.begin(lambda: progress.ahead, lambda: self._awaited_request is None, self._on_checked)
+
+    def _on_checked(self, verdict: Audit) -> None:
+        message = f"The map changed, and the published path is not free on it: {'; '.join(verdict.findings)}. It is"
+        if verdict.ok:
+            self._map_changed = self.is_planning
+            self._replan()
         elif self._goal is None:
-            self._answer(Outcome(Status.NO_VALID_PATH, f"{message}; its goal was cancelled, so that nothing is planned."))
+            message += " withdrawn; its goal was cancelled, so that nothing is planned."
+            self._answer(Outcome(Status.NO_VALID_PATH, message))
         else:
-            self._answer(Outcome(Status.NO_VALID_PATH, f"{message}, and planned again."))
-            self._begin(self._goal)
-            self._plan()
+            self._warn(Status.NO_VALID_PATH, f"{message} planned again, and stays until then.")
+            self._plan(_Purpose.GOAL, self._dispatcher.new_id())
+
+    def _replan(self) -> None:
+        """Plan again, from the newest start, where the goal is still pursued and nothing is under way."""
+        rate = self._parameters.read().node.replan_rate
+        if self._goal is None or self._is_reached or not rate:
+            self._replan_timer.cancel()
+        elif self._replan_timer.timer_period_ns != round(1e9 / rate):
+            _restart(self._replan_timer, 1 / rate)
+        if self._goal is not None and not self._is_reached and not self.is_planning:
+            self._map_changed = False
+            if self._progress is not None:
+                self._plan(_Purpose.REPLAN)
+            else:
+                self._retry("")
+
+
+def _restart(timer, interval: float) -> None:
+    """Have a timer call back after this time [s], and again and again."""
+    timer.timer_period_ns = round(interval * 1e9)
+    timer.reset()

@@ -1,7 +1,7 @@
 """An action of Nav2's planner_server: a path over the poses of each goal."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from .outputs import Outputs
 from .parameters import Parameters
 from .qos import SERVICE
 from .readiness import Readiness
-from .request import PlanRequest, RefusedRequest
+from .request import PlanRequest, RefusedRequest, Route
 
 #: Time for which the result of a goal is kept for its client, as Nav2's servers do [s].
 RESULT_TIMEOUT = 10
@@ -120,24 +120,25 @@ class PathServer:
         if not goals:
             return self._refused(path, NO_VIAPOINTS_GIVEN, "There are no goals; give at least one.")
         answer = _Answer(self._outputs)
-        plan_id = self._dispatcher.new_id()
-        submission = self._dispatcher.submit(self._worker, self._request(plan_id, request, goals),
-                                             partial(self._end, answer), finish=answer.fill)
+        submission = self._dispatcher.submit(self._worker, self._request(request, goals),
+                                             partial(self._end, answer, self._dispatcher.new_id()), finish=answer.fill)
         goal.run(submission)
         outcome = await submission.outcome
         if answer.path.poses and not goal.is_to_end:
             self._outputs.publish_path(answer.serialized)
         return {"path": answer.path, **self._action.error(outcome.status, outcome.message)}
 
-    def _request(self, plan_id: int, request: Any, goals: list[PoseStamped]) -> PlanRequest | RefusedRequest:
+    def _request(self, request: Any, goals: list[PoseStamped]) -> PlanRequest | RefusedRequest:
         try:
-            world_map = self._readiness.require_map()
-            start = self._frames.pose("start", request.start) if request.use_start else self._readiness.require_start()
-            waypoints = tuple(self._frames.pose(f"waypoint {n}", pose) for n, pose in enumerate(goals[:-1], 1))
-            planned = self._dispatcher.request(plan_id, world_map, start, self._frames.pose("goal", goals[-1]))
-            return replace(planned, waypoints=waypoints)
+            return self._dispatcher.request(self._readiness.require_map(), partial(self._locate, request, goals))
         except Exception as error:
-            return RefusedRequest(plan_id, error)
+            return RefusedRequest(error)
+
+    def _locate(self, request: Any, goals: list[PoseStamped]) -> Route:
+        # In a worker's thread.
+        start = self._frames.pose("start", request.start) if request.use_start else self._readiness.require_start()
+        waypoints = tuple(self._frames.pose(f"waypoint {n}", pose) for n, pose in enumerate(goals[:-1], 1))
+        return Route(start, self._frames.pose("goal", goals[-1]), waypoints)
 
     def _end(self, answer: "_Answer", plan_id: int, outcome: Outcome) -> None:
         self._outputs.report(outcome, request="action", plan_id=plan_id, revision=1, map_id=self._readiness.map_id,

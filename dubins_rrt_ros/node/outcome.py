@@ -11,6 +11,11 @@ from dubins_rrt_ros.planning import InvalidPose, Plan, Status
 
 from .request import Refusal
 
+#: What can cure a failure; any other stays until the next goal.
+CURES = {Status.NO_MAP: "map", Status.NO_START: "start", Status.TF_ERROR: "transform", Status.GOAL_OUTSIDE_MAP: "map",
+         Status.GOAL_OCCUPIED: "map", Status.START_OUTSIDE_MAP: "map or a start", Status.START_OCCUPIED: "map or a start",
+         Status.NO_VALID_PATH: "map or a start", Status.TIMEOUT: "map or a start"}
+
 
 class Outcome(NamedTuple):
     """A status, the sentence that explains it and, where a planner ran, its plan.
@@ -18,12 +23,19 @@ class Outcome(NamedTuple):
     Attributes:
         status, message, plan: these.
         is_warning: True if it is no failure, but a person should look at it.
+        is_final: True if nothing that may come can cure it, as it otherwise could.
     """
 
     status: Status
     message: str
     plan: Plan | None = None
     is_warning: bool = False
+    is_final: bool = False
+
+    @property
+    def cure(self) -> str:
+        """The inputs that can cure this failure, in words; "" where there are none."""
+        return "" if self.is_final else CURES.get(self.status, "")
 
 
 def outcome_of(result: Plan | Exception, node: Node) -> Outcome:
@@ -31,7 +43,7 @@ def outcome_of(result: Plan | Exception, node: Node) -> Outcome:
     if isinstance(result, Plan):
         return Outcome(result.status, result.message, result)
     if isinstance(result, Refusal):
-        return Outcome(result.status, str(result))
+        return Outcome(result.status, str(result), is_final=result.is_final)
     if isinstance(result, InvalidPose):
         return Outcome(Status.INVALID_POSE, str(result))
     node.get_logger().error("".join(traceback.format_exception(result)))

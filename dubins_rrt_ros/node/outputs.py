@@ -75,11 +75,6 @@ class Outputs:
         if last or is_new or time.monotonic() >= self._tree_due:
             self._show_tree(FINAL_TREE if last else GROWING_TREE)
 
-    def withdraw(self) -> None:
-        """Publish an empty path in place of the one that is shown, and clear its tree."""
-        self._show_path(None)
-        self._show_tree(FINAL_TREE)
-
     def path(self, plan: Plan | None) -> PathMessage:
         """Return the path of a plan as a message, empty where there is none; any thread may ask for it."""
         return path_message(poses_of(plan), self._frame, self._now())
@@ -102,10 +97,11 @@ class Outputs:
             request, plan_id, revision, stamp: as in `status_message`.
             map_id: the newest map's; the plan's own takes precedence.
         """
-        status, message, plan, is_warning = outcome
+        status, plan = outcome.status, outcome.plan
         self.status, self.plan_id = status, plan_id
-        self._event = status_message(self._name, status, message, plan=plan, request=request, plan_id=plan_id, revision=revision,
-                                     map_id=map_id if plan is None else plan.problem.map.id, stamp=stamp, is_warning=is_warning)
+        self._event = status_message(self._name, status, outcome.message, plan=plan, request=request, plan_id=plan_id,
+                                     revision=revision, map_id=map_id if plan is None else plan.problem.map.id, stamp=stamp,
+                                     is_warning=outcome.is_warning)
         self._status.publish(self._event)
         if log:
             self._log(self._event)

@@ -1,6 +1,7 @@
 """The node's parameters, declared from the options of dataclasses: the library's and the node's own."""
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -35,8 +36,16 @@ class NodeOptions:
     free_thresh: float = option(0.25, "cells of a grid by topic are free up to this share; a map of probabilities may need more, "
                                       "such as 0.49", low=0.0, high=1.0)
     publish_tree: bool = option(True, "publish the tree on ~/tree while somebody subscribes")
-    replan_on_map_change: bool = option(False, "check the published path against every new map, and plan again where it "
-                                               "is no longer free")
+    publish: str = option("improvements", "paths of a request that are published: improvements, each better one; final, the last",
+                          choices=("improvements", "final"))
+    replan_on_map_change: bool = option(False, "check what is left of the published path against every new map, and plan again")
+    replan_rate: float = option(0.0, "how often the goal is planned again from the newest start, until it is reached; 0 is never",
+                                unit="Hz", low=0.0, high=100.0)
+    replan_gain: float = option(0.05, "share by which a path planned again must be shorter than the rest of the published one to "
+                                      "replace it, unless that is no longer free", low=0.0, high=1.0)
+    goal_reached_xy: float = option(0.25, "distance within which a goal is reached, and no longer planned again", unit="m",
+                                    low=0.0, high=1e6)
+    goal_reached_yaw: float = option(0.5, "heading error within which it is", unit="rad", low=0.0, high=math.pi)
     planner_ids: tuple[str, ...] = option(("GridBased",), "names by which Nav2's actions may ask for this planner")
     check_invariants: bool = option(False, "for debugging: check the invariants of every answer, its path and its tree before "
                                            "it is published, which is slow")

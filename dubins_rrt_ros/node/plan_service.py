@@ -12,9 +12,10 @@ from .dispatcher import Dispatcher
 from .frames import Frames
 from .outcome import Outcome
 from .outputs import Outputs
+from .parameters import OPTIONS
 from .qos import SERVICE
 from .readiness import Readiness
-from .request import PlanRequest, Refusal, RefusedRequest
+from .request import PlanRequest, Refusal, RefusedRequest, Route
 
 
 class PlanService:
@@ -29,26 +30,38 @@ class PlanService:
         plan_id = self._dispatcher.new_id()
         response.plan = self._outputs.path(None)
         try:
-            planned: PlanRequest | RefusedRequest = self._plan_request(plan_id, request)
+            planned: PlanRequest | RefusedRequest = self._plan_request(request)
         except Exception as error:
-            planned = RefusedRequest(plan_id, error)
+            planned = RefusedRequest(error)
 
         def fill(plan: Plan) -> None:
             response.plan = self._outputs.path(plan)
 
-        await self._dispatcher.submit(self._dispatcher.services, planned, partial(self._end, response), finish=fill).outcome
+        end = partial(self._end, response, plan_id)
+        await self._dispatcher.submit(self._dispatcher.services, planned, end, finish=fill).outcome
         return response
 
-    def _plan_request(self, plan_id: int, request: GetPlan.Request) -> PlanRequest:
-        world_map = self._readiness.require_map()
-        start = self._frames.pose("start", request.start)
-        goal = self._frames.pose("goal", request.goal, self._dispatcher.any_goal_heading)
-        options = {} if request.tolerance == 0 else {"goal_tolerance_xy": request.tolerance}
-        try:
-            return self._dispatcher.request(plan_id, world_map, start, goal, **options)
-        except OptionError as error:
-            raise Refusal(Status.INVALID_POSE, f"The tolerance of the request cannot be used: {error}") from None
+    def _plan_request(self, request: GetPlan.Request) -> PlanRequest:
+        options = {} if request.tolerance == 0 else {"goal_tolerance_xy": _checked_tolerance(request.tolerance)}
+        locate = partial(self._locate, request, self._dispatcher.any_goal_heading)
+        return self._dispatcher.request(self._readiness.require_map(), locate, **options)
+
+    def _locate(self, request: GetPlan.Request, any_heading: bool) -> Route:
+        # In a worker's thread.
+        return Route(self._frames.pose("start", request.start), self._frames.pose("goal", request.goal, any_heading))
 
     def _end(self, response: GetPlan.Response, plan_id: int, outcome: Outcome) -> None:
         self._outputs.report(outcome, request="get_plan", plan_id=plan_id, revision=1, map_id=self._readiness.map_id,
                              stamp=response.plan.header.stamp)
+
+
+def _checked_tolerance(tolerance: float) -> float:
+    """Return the tolerance of a request [m].
+
+    Raises:
+        Refusal: it is out of range.
+    """
+    try:
+        return OPTIONS["goal_tolerance_xy"].convert(tolerance)
+    except OptionError as error:
+        raise Refusal(Status.INVALID_POSE, f"The tolerance of the request cannot be used: {error}") from None

@@ -50,7 +50,8 @@ class PlannerNode(Node):
         self._readiness = Readiness(self, parameters, self._maps, self._outputs)
         self._dispatcher = Dispatcher(self, parameters, self._maps, self._queue)
         self._path_check = PathCheck(self, parameters, self._maps, self._outputs, self._queue)
-        self._session = GoalSession(self, self._dispatcher, self._readiness, self._frames, self._outputs, self._path_check)
+        self._session = GoalSession(self, parameters, self._dispatcher, self._readiness, self._frames, self._outputs,
+                                    self._path_check)
         self._readiness.update()
         self._listen()
 
@@ -106,15 +107,15 @@ class PlannerNode(Node):
         self._readiness.update()
 
     def _on_map_prepared(self) -> None:
-        self._session.check_path()
+        self._session.map_came()
 
     def _on_reminder(self) -> None:
-        self._readiness.remind(is_idle=not (self._session.is_planning or self._session.waits_for_start))
+        self._readiness.remind(is_idle=not self._session.is_planning)
 
     def _on_start(self, message: PoseStamped | PoseWithCovarianceStamped) -> None:
         with failures_reported(self, self._readiness.refuse_start):
-            self._readiness.take_start(self._frames.pose("start", message))
-            self._session.start_came()
+            self._readiness.take_start(start := self._frames.pose("start", message))
+            self._session.start_came(start)
 
     async def _on_cancel(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         messages = [message] if (message := self._session.cancel()) else []

@@ -9,10 +9,12 @@ from .outcome import Outcome
 from .outputs import Outputs
 from .parameters import Parameters
 from .qos import incompatible_map_publishers, incompatible_publishers
-from .request import Refusal
+from .request import NotYet, Refusal
 
 #: The topics of a start, and their types.
 START_TOPICS = {"start_pose": "geometry_msgs/msg/PoseStamped", "initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped"}
+#: Time that a goal waits for a start [s]: one that was sent just before may still be under way, as topics keep no common order.
+START_GRACE = 0.5
 
 
 class Readiness:
@@ -43,24 +45,23 @@ class Readiness:
         return self._maps.map
 
     def require_start(self) -> Pose:
-        """Return the start.
+        """Return the start; any thread may ask for it.
 
         Raises:
-            Refusal: there is none.
+            NotYet: there is none.
         """
-        if self.start is None:
-            raise Refusal(Status.NO_START, f"There is no start to plan from: {self._remedy_for_start()}")
-        return self.start
+        start = self.start
+        if start is None:
+            raise NotYet("a start", START_GRACE, self._no_start)
+        return start
+
+    def _no_start(self) -> Refusal:
+        return Refusal(Status.NO_START, f"There is no start to plan from: {self._remedy_for_start()}")
 
     @property
     def map_id(self) -> str:
         """The id of the newest map, "" where there is none."""
         return "" if self._maps.map is None else self._maps.map.id
-
-    @property
-    def lacks_start_alone(self) -> bool:
-        """True if there is a map and no start."""
-        return self._maps.map is not None and self.start is None
 
     # What comes
 

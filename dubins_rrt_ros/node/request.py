@@ -5,23 +5,43 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan, plan_through
-from dubins_rrt_ros.planning.problem import Waypoint
+from dubins_rrt_ros.planning.problem import Pose, Waypoint
 from dubins_rrt_ros.planning.text import one_line
 
 #: Minimum time between two reports of an improved path [s].
 IMPROVEMENT_INTERVAL = 0.1
-#: Maximum time until a cancellation is noticed while a map is prepared [s].
-PREPARING_INTERVAL = 0.01
+#: Maximum time until a cancellation is noticed while a map is prepared, and time between two looks for a pose [s].
+WAITING_INTERVAL = 0.01
 
 
 class Refusal(Exception):
-    """A request that is not planned: the status and the sentence that say why."""
+    """A request that is not planned: the status and the sentence that say why.
 
-    def __init__(self, status: Status, message: str):
+    Attributes:
+        status: the status.
+        is_final: True if nothing that may come can cure it.
+    """
+
+    def __init__(self, status: Status, message: str, is_final: bool = False):
         super().__init__(one_line(message))
-        self.status = status
+        self.status, self.is_final = status, is_final
+
+
+class NotYet(Exception):
+    """A pose that is not known yet.
+
+    Attributes:
+        what: a start, or a transform.
+        patience: time that it is waited for [s].
+        refusal: makes the refusal if it has not come by then.
+    """
+
+    def __init__(self, what: str, patience: float, refusal: Callable[[], Refusal]):
+        super().__init__(what)
+        self.what, self.patience, self.refusal = what, patience, refusal
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +49,9 @@ class RefusedRequest:
     """A request that cannot be planned; it has its turn nevertheless, so that answers come in order.
 
     Attributes:
-        id: the plan_id of its answer.
         error: why.
     """
 
-    id: int
     error: Exception
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
@@ -41,24 +59,36 @@ class RefusedRequest:
         raise self.error
 
 
+class Route(NamedTuple):
+    """The poses of a request, in the frame of the map.
+
+    Attributes:
+        start, goal: where its path begins and ends.
+        waypoints: what it passes in between.
+    """
+
+    start: Pose
+    goal: Pose
+    waypoints: tuple[Waypoint, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
     """A request to plan.
 
     Attributes:
-        id: the plan_id of its answers.
-        problem, settings: the arguments of plan().
+        locate: called when planning may begin, for the start may move until then; raises NotYet while a pose is not known.
+        problem: makes the problem of a start and a goal.
+        settings: how to plan.
         world: the problem's map, once it is prepared.
         check_invariants: True if every answer is checked, improvements too.
-        waypoints: what the path passes between the problem's start and goal.
     """
 
-    id: int
-    problem: Problem
+    locate: Callable[[], Route]
+    problem: Callable[[Pose, Pose], Problem]
     settings: Settings
     world: Future[World]
     check_invariants: bool = False
-    waypoints: tuple[Waypoint, ...] = ()
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
         """Plan, and return the answer.
@@ -69,10 +99,13 @@ class PlanRequest:
             cancelled: called about every 10 ms; True ends the request.
 
         Raises:
-            Refusal: it was cancelled before planning began.
+            Refusal: it was cancelled before planning began, or a pose has not come.
+            OptionError, InvalidPose: by `problem`.
             PlanError, PathError, TreeError: an answer broke an invariant.
         """
-        problem = self._prepared_problem(cancelled)
+        route = self._route(cancelled)
+        problem = self.problem(route.start, route.goal)
+        problem = replace(problem, world=self.world.result().for_vehicle(problem.vehicle))
         throttle = _Throttle(IMPROVEMENT_INTERVAL)
 
         def on_progress(progress: Progress) -> None:
@@ -81,7 +114,7 @@ class PlanRequest:
                 if snapshot.path is not None:
                     improved(self._checked(snapshot))
 
-        search = partial(plan_through, problem, self.waypoints) if self.waypoints else partial(plan, problem)
+        search = partial(plan_through, problem, route.waypoints) if route.waypoints else partial(plan, problem)
         return self._checked(search(self.settings, cancel=cancelled, on_progress=on_progress))
 
     def _checked(self, answer: Plan) -> Plan:
@@ -89,13 +122,28 @@ class PlanRequest:
             answer.check()
         return answer
 
-    def _prepared_problem(self, cancelled: Callable[[], bool]) -> Problem:
-        """Wait for the world, and return the problem in it."""
-        while not cancelled() and wait([self.world], PREPARING_INTERVAL).not_done:
+    def _route(self, cancelled: Callable[[], bool]) -> Route:
+        """Wait for poses and world, and return the poses as they are then."""
+        route = self._located(cancelled)
+        if self.world.done():
+            return route
+        while not cancelled() and wait([self.world], WAITING_INTERVAL).not_done:
             pass
-        if cancelled():
-            raise Refusal(Status.CANCELLED, "Cancelled before a first path: the planner had not begun yet.")
-        return replace(self.problem, world=self.world.result().for_vehicle(self.problem.vehicle))
+        return self._located(cancelled)
+
+    def _located(self, cancelled: Callable[[], bool]) -> Route:
+        """Wait for the poses, each as long as is worth it."""
+        began = time.monotonic()
+        why = "the planner had not begun yet."
+        while not cancelled():
+            try:
+                return self.locate()
+            except NotYet as missing:
+                if time.monotonic() - began >= missing.patience:
+                    raise missing.refusal() from None
+                why = f"the goal waited for {missing.what}."
+            time.sleep(WAITING_INTERVAL)
+        raise Refusal(Status.CANCELLED, f"Cancelled before a first path: {why}")
 
 
 class _Throttle:

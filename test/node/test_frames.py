@@ -35,6 +35,13 @@ def planner(module_planners, tmp_path_factory):
     return module_planners.client()
 
 
+def tf_error(planner, request):
+    """The status of a request of this kind that is about a transform."""
+    wanted = {"error_name": "TF_ERROR", "request": request}
+    return planner.wait_for(lambda: next((status for status in planner.statuses if wanted.items() <= values_of(status).items()),
+                                         None), f"a status with {wanted}")
+
+
 def assert_says_what_to_do(status):
     told = values_of(status)
     assert (status.level, told["error_code"], told["error_name"]) == (DiagnosticStatus.ERROR, "202", "TF_ERROR")
@@ -46,13 +53,12 @@ def assert_says_what_to_do(status):
 @pytest.mark.parametrize(("topic", "name"), [("start_pose", "start"), ("initialpose", "start"), ("goal_pose", "goal")])
 def test_without_tf2_a_pose_in_another_frame_is_refused_with_both_names_and_what_to_install(planner, topic, name):
     planner.send("start_pose", START, frame="world")
-    before, plan_id = len(planner.statuses), planner.next_id
+    planner.statuses.clear()
     planner.send(topic, GOAL, frame="odom")
-    status = planner.wait_for(lambda: planner.statuses[before:], "a status")[0]
-    told = values_of(status)
-    assert told["plan_id"] == (str(plan_id) if name == "goal" else "0")
+    status = tf_error(planner, "goal" if name == "goal" else "")
     assert_says_what_to_do(status)
     assert f"The {name} pose" in status.message
+    assert (values_of(status)["plan_id"] == "0") == (name == "start")
 
 
 @without_tf2
@@ -60,18 +66,18 @@ def test_without_tf2_a_pose_in_another_frame_is_refused_with_both_names_and_what
 def test_without_tf2_get_plan_refuses_a_pose_in_another_frame_likewise(planner, foreign):
     poses = {"start": stamped(START, "world"), "goal": stamped(GOAL, "world")}
     poses[foreign].header.frame_id = "odom"
-    before = len(planner.statuses)
+    planner.statuses.clear()
     path = planner.call(GetPlan, "get_plan", **poses).plan
     assert (path.header.frame_id, path.poses) == ("world", [])
-    status = planner.wait_for(lambda: planner.statuses[before:], "a status")[0]
+    status = tf_error(planner, "get_plan")
     assert_says_what_to_do(status)
     assert f"The {foreign} pose" in status.message
 
 
 def test_a_leading_slash_is_told_to_be_left_out(planner):
-    before = len(planner.statuses)
+    planner.statuses.clear()
     assert planner.call(GetPlan, "get_plan", start=stamped(START, "world"), goal=stamped(GOAL, "/world")).plan.poses == []
-    status = planner.wait_for(lambda: planner.statuses[before:], "a status")[0]
+    status = tf_error(planner, "get_plan")
     assert "'/world'" in status.message and "leading slash; leave it out" in status.message
     assert "publish that transform" not in status.message
 

@@ -1,6 +1,5 @@
 """Maps that change while the node plans or shows a path, by topic, through the executable."""
 
-import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -9,29 +8,21 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.srv import GetMap, LoadMap
 from std_srvs.srv import Trigger
 from support.harness import occupancy, poses_of, values_of
+from support.walls import (
+    CLOSED,
+    DETOUR,
+    FREE,
+    HARMLESS,
+    end_of_goal,
+    id_of,
+    publish,
+    show_path,
+    statuses_of,
+    wait_for_path_around,
+)
 from support.yard import ENDLESS, GOAL, QUICK, START
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan
-
-
-def walled(*rows_and_columns):
-    """10 m x 10 m with walls, each the rows and columns that it takes."""
-    cells = np.zeros((100, 100), dtype=np.int8)
-    for part in rows_and_columns:
-        cells[part] = 100
-    return cells
-
-
-FREE = walled()
-#: A wall across the way from START to GOAL that leaves 2 m at the lower edge.
-DETOUR = walled(np.s_[20:, 50:52])
-CLOSED = walled(np.s_[:, 50:52])
-#: A box far from the way.
-HARMLESS = walled(np.s_[95:, :5])
-
-
-def id_of(cells):
-    return GridMap(cells, 0.1).id
 
 
 @pytest.fixture(scope="module")
@@ -44,21 +35,6 @@ def replanning(module_planners):
 def plain(module_planners):
     process = module_planners.start(**QUICK)
     return process, module_planners.client()
-
-
-def publish(client, process, cells):
-    """Publish a map; it is in use and prepared when this returns."""
-    client.publish_map(occupancy(cells))
-    client.wait_for(lambda: process.map_id == id_of(cells), f"the map {id_of(cells)} to be taken")
-
-
-def show_path(client, process):
-    """The id of a request whose path, straight through the free map, is on display."""
-    client.call(Trigger, "cancel")
-    client.set_parameters(**QUICK)
-    publish(client, process, FREE)
-    client.send("start_pose", START)
-    return end_of_goal(client)
 
 
 def test_a_map_that_comes_again_and_again_is_said_once(plain):
@@ -81,33 +57,6 @@ def test_a_map_that_comes_again_after_a_refused_one_ends_the_remark_on_an_older_
     client.wait_for(lambda: "on an older map" in client.plan(START, GOAL)[1]["message"], "the remark")
     client.publish_map(occupancy(FREE))
     client.wait_for(lambda: "on an older map" not in client.plan(START, GOAL)[1]["message"], "an answer without the remark")
-
-
-def end_of_goal(client):
-    plan_id = client.next_id
-    client.send("goal_pose", GOAL)
-    told = client.status_of(plan_id, samples=str(QUICK["samples"]))
-    assert (told["error_name"], told["map_id"]) == ("NONE", id_of(FREE))
-    client.wait_for(lambda: client.paths and len(client.paths[-1].poses) > 1, "its path")
-    return plan_id
-
-
-def distance_to_wall(path, cells):
-    """The least distance from a path's points to the occupied cells [m]."""
-    rows, columns = np.nonzero(cells)
-    low = np.stack([columns, rows], axis=1) * 0.1
-    off = np.maximum(np.maximum(low - (points := path[:, None, :2]), points - low - 0.1), 0.0)
-    return np.hypot(off[..., 0], off[..., 1]).min()
-
-
-def wait_for_path_around(client, cells):
-    """Until the path on display keeps away from the occupied cells, as the ones before did not."""
-    client.wait_for(lambda: client.paths[-1].poses and distance_to_wall(poses_of(client.paths[-1]), cells) >= 0.2,
-                    "a path around")
-
-
-def statuses_of(client, plan_id):
-    return [values_of(status) for status in client.statuses if values_of(status)["plan_id"] == str(plan_id)]
 
 
 def test_a_request_keeps_the_map_that_it_began_with_and_the_next_has_the_new_one(plain):
@@ -142,7 +91,7 @@ def test_on_a_map_that_changed_paths_are_the_same_as_on_one_that_is_new(plain):
             assert poses_of(path)[:, :2] == pytest.approx(wanted[:, :2], abs=1e-9)
 
 
-def test_a_path_that_a_new_map_blocks_is_withdrawn_and_planned_again(replanning):
+def test_a_path_that_a_new_map_blocks_is_told_at_once_and_stays_until_it_is_replaced(replanning):
     process, client = replanning
     plan_id = show_path(client, process)
     shown = len(client.paths)
@@ -151,7 +100,9 @@ def test_a_path_that_a_new_map_blocks_is_withdrawn_and_planned_again(replanning)
     assert (told["error_name"], told["map_id"]) == ("NONE", id_of(DETOUR))
     client.wait_for_word("The map changed, and the published path is not free on it")
     wait_for_path_around(client, DETOUR)
-    assert client.paths[shown].poses == []
+    assert all(path.poses for path in client.paths[shown:])
+    *_, broken = statuses_of(client, plan_id)
+    assert (broken["error_name"], broken["request"], broken["map_id"]) == ("NO_VALID_PATH", "goal", id_of(DETOUR))
     path = poses_of(client.paths[-1])
     assert path[0].tolist() == list(START)
     assert path[-1] == pytest.approx(GOAL, abs=1e-9)
@@ -198,13 +149,13 @@ def test_a_map_that_leaves_no_way_ends_in_an_error_and_an_empty_path(replanning)
     assert client.paths[-1].header.frame_id == "map"
 
 
-def test_after_an_error_a_new_map_is_not_planned_on_by_itself(replanning):
+def test_after_an_error_the_goal_is_planned_again_as_soon_as_a_map_allows_it(replanning):
     process, client = replanning
     plan_id = show_path(client, process)
     publish(client, process, CLOSED)
     client.status_of(plan_id + 1, error_code="208")
     publish(client, process, FREE)
-    assert values_of(client.statuses[-1])["plan_id"] == str(plan_id + 1)
+    client.status_of(plan_id + 1, samples=str(QUICK["samples"]), error_name="NONE")
     assert end_of_goal(client) == plan_id + 2
 
 
@@ -218,9 +169,9 @@ def test_a_map_that_changes_during_a_request_is_checked_when_it_ends(replanning)
     publish(client, process, DETOUR)
     told = client.status_of(plan_id + 1, error_name="NONE")
     assert told["map_id"] == id_of(DETOUR)
-    *planned, withdrawn = statuses_of(client, plan_id)
+    *planned, broken = statuses_of(client, plan_id)
     assert {(told["error_name"], told["map_id"]) for told in planned} == {("NONE", id_of(FREE))}
-    assert (withdrawn["error_name"], withdrawn["map_id"]) == ("NO_VALID_PATH", id_of(DETOUR))
+    assert (broken["error_name"], broken["map_id"]) == ("NO_VALID_PATH", id_of(DETOUR))
     assert "the published path is not free on it" in process.output
     wait_for_path_around(client, DETOUR)
 

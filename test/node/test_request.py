@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dubins_rrt_ros.node import request as module
-from dubins_rrt_ros.node.request import IMPROVEMENT_INTERVAL, PlanRequest, Refusal, _Throttle
+from dubins_rrt_ros.node.request import IMPROVEMENT_INTERVAL, PlanRequest, Refusal, Route, _Throttle
 from dubins_rrt_ros.planning import GridMap, PlanError, Problem, Progress, Settings, Status, Vehicle, plan, prepare
 
 ENDLESS = {"samples": 10_000_000, "planning_time": 600.0, "seed": 1}
@@ -26,8 +26,13 @@ def problem():
 def request_for(problem):
     """A function that makes a request whose map is prepared."""
     def make(wanted=problem, **settings):
-        return PlanRequest(1, wanted, Settings(**settings), in_future(prepare(wanted.map, wanted.vehicle)))
+        return PlanRequest(*route_of(wanted), Settings(**settings), in_future(prepare(wanted.map, wanted.vehicle)))
     return make
+
+
+def route_of(problem):
+    """The arguments of a request for this problem, whose poses are known."""
+    return lambda: Route(problem.start, problem.goal), lambda start, goal: replace(problem, start=start, goal=goal)
 
 
 def in_future(world):
@@ -86,7 +91,7 @@ def test_a_request_waits_until_its_map_is_prepared(problem):
         waiting.set()
         return False
 
-    request = PlanRequest(1, problem, Settings(samples=100, planning_time=60.0, seed=1), world)
+    request = PlanRequest(*route_of(problem), Settings(samples=100, planning_time=60.0, seed=1), world)
     serving = threading.Thread(target=lambda: answers.append(request.serve(lambda plan: None, not_cancelled)))
     serving.start()
     assert waiting.wait(5.0)
@@ -99,7 +104,7 @@ def test_a_request_waits_until_its_map_is_prepared(problem):
 def test_a_request_can_be_cancelled_while_its_map_is_prepared(problem):
     asked = itertools.count()
     with pytest.raises(Refusal) as refusal:
-        PlanRequest(1, problem, Settings(), Future()).serve(pytest.fail, lambda: next(asked) > 2)
+        PlanRequest(*route_of(problem), Settings(), Future()).serve(pytest.fail, lambda: next(asked) > 2)
     assert refusal.value.status is Status.CANCELLED
 
 

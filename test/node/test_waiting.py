@@ -124,8 +124,8 @@ def test_a_refused_start_is_told_with_what_is_waited_for_and_a_good_one_ends_the
     client.statuses.clear()
     client.send("start_pose", (math.inf, 5.0, 0.0))
     client.status_of(0, error_name="INVALID_POSE")
-    client.send("start_pose", START)
-    assert client.status_of(0, error_name="NONE")["message"] == "Ready for a goal."
+    client.send("start_pose", START)  # the goal stands
+    assert client.status_of(1, samples="300")["error_name"] == "NONE"
     client.statuses.clear()
     client.send("goal_pose", GOAL)
     assert client.status_of(2, samples="300")["error_name"] == "NONE"
@@ -175,32 +175,27 @@ def nothing_known(planners):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("has_start", [False, True], ids=["without a start", "with a start"])
-def test_once_a_map_came_the_status_is_no_longer_that_there_is_none(nothing_known, has_start):
+def test_once_a_map_came_the_status_is_no_longer_that_there_is_none(nothing_known):
     client = nothing_known
     client.listen_to_diagnostics()
     client.status_of(0, error_name="NO_MAP")
-    if has_start:
-        client.send("start_pose", START)
-        client.send("goal_pose", GOAL)  # sent later, so that the start has come in, too, when it is answered
-        client.status_of(1, error_name="NO_MAP")
     client.publish_map(occupancy(FREE))
     client.wait_for_word("The map is ready")
-    name = "NONE" if has_start else "NO_START"
-    told = client.status_of(0, error_name=name)
-    assert told["level"] == (DiagnosticStatus.OK if has_start else DiagnosticStatus.WARN)
+    told = client.status_of(0, error_name="NO_START")
+    assert told["level"] == DiagnosticStatus.WARN
     assert told["map_id"]
-    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == name, "a diagnostic that says so too")
+    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == "NO_START", "a diagnostic that says so too")
 
 
-def test_a_goal_that_came_before_the_map_is_not_planned_when_it_comes(nothing_known):
-    """The goal was answered: there was no map. Who sent it sends it again."""
+def test_a_goal_that_came_before_the_map_is_told_what_it_waits_for_and_planned_when_that_comes(nothing_known):
     client = nothing_known
+    client.listen_to_diagnostics()
+    client.status_of(0, error_name="NO_MAP")
     client.send("start_pose", START)
-    client.send("goal_pose", GOAL)
-    client.status_of(1, error_name="NO_MAP")
+    client.send("goal_pose", GOAL)  # sent later, so that the start has come in, too, when it is answered
+    client.wait_for(lambda: client.statuses[-1].message.startswith("Waiting for a map: "), "what it waits for")
+    told = [(status.level, values_of(status)["error_name"]) for status in client.statuses if values_of(status)["plan_id"] == "1"]
+    assert told == [(DiagnosticStatus.STALE, "NO_MAP"), (DiagnosticStatus.WARN, "NO_MAP")]
     client.publish_map(occupancy(FREE))
-    client.wait_for_word("The map is ready")
-    client.send("goal_pose", GOAL)
-    assert client.status_of(2, samples="300")["error_name"] == "NONE"
-    assert values_of(client.statuses[-1])["plan_id"] == "2"
+    assert client.status_of(1, samples="300")["error_name"] == "NONE"
+    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == "NONE", "a diagnostic that says so too")

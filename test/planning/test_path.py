@@ -96,6 +96,21 @@ def test_poses_along_the_path_are_those_of_its_curves():
     np.testing.assert_allclose(path.at(np.array([0, 1]))[:, :2], path.waypoints[[0, -1], :2], atol=1e-9)
 
 
+def test_what_is_left_of_a_path_is_driven_as_before():
+    path = random_path(np.random.default_rng(6))
+    ends = np.cumsum(path.lengths[1:].sum(axis=1))
+    for arc_length in (*np.linspace(0.0, path.length, 50), *ends.tolist()):
+        left = path.after(arc_length)
+        left.check()
+        assert left.end == path.end
+        assert left.length == pytest.approx(path.length - arc_length, abs=1e-9)
+        shares = np.linspace(0.0, 1.0, 30)
+        if left.curves:
+            expected = path.at((arc_length + shares * left.length) / path.length)
+            assert np.abs(left.at(shares)[:, :2] - expected[:, :2]).max() < 1e-9
+            assert np.abs(np.sin((left.at(shares)[:, 2] - expected[:, 2]) / 2)).max() < 1e-9
+
+
 def test_no_poses_are_asked_for():
     path = random_path(np.random.default_rng(5))
     assert path.at(np.empty(0)).shape == (0, 3)

@@ -120,6 +120,22 @@ class Path:
         return poses_on(self.waypoints, self.words, self.lengths, self.radius, curves, curves + 1,
                         arc_lengths - np.append(0.0, ends)[curves])
 
+    def after(self, arc_length: float) -> "Path":
+        """Return what is left of the path behind an arc length [m]; its first waypoint is a pose of the path."""
+        ends = np.cumsum(self.lengths[1:].sum(axis=1))
+        if len(ends) == 0 or arc_length >= ends[-1]:
+            return Path.of_pose(self.end)
+        if arc_length <= 0:
+            return self
+        i = 1 + int(np.searchsorted(ends, arc_length, side="right"))
+        driven = arc_length - (ends[i - 2] if i > 1 else 0.0)
+        arcs = np.cumsum(self.lengths[i])
+        start = np.empty((1, 3))
+        _kernel.poses_along(self.waypoints[i - 1], self.radius, self.words[i], self.lengths[i], np.array([driven]), start)
+        lengths = self.lengths[i - 1:].copy()
+        lengths[1] = np.clip(arcs - driven, 0.0, self.lengths[i])
+        return Path(np.concatenate([start, self.waypoints[i:]]), self.words[i - 1:], lengths, self.radius)
+
     def cut(self, longest: float) -> "Path":
         """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited."""
         if longest == 0 or len(self.words) < 2:
