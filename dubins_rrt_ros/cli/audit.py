@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dubins_rrt_ros import __version__
-from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Problem, Vehicle, audit_path, values
+from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Path, Problem, Settings, Vehicle, audit_path, values
+from dubins_rrt_ros.planning.audit import cost_of
 from dubins_rrt_ros.planning.audit.document import document_findings, pose_findings, unjudged_fields
 from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
@@ -126,11 +127,16 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
     # With other things than it was planned with its clearance is another.
     others = ["min_clearance"] if given or of_request or arguments.any_map else []
     others += ["map_id"] if arguments.any_map else []
+    others += ["cost", "cost_lower_bound", "cost_gap"] if others else []
     findings = document_findings({name: value for name, value in document.items() if name not in others}, path, found,
-                                 world_map.id)
+                                 world_map.id, None if others or not found.ok else _cost(path, problem, settings))
     along = () if math.isinf(found.max_curvature) else pose_findings(_poses(document), path, spacing)
     return Verdict(problem, path.length, replace(found, findings=(*found.findings, *along, *findings)),
                    tuple(unjudged_fields(document, others)))
+
+
+def _cost(path: Path, problem: Problem, settings: Settings) -> float:
+    return cost_of(path, problem, settings.preferred_clearance_of(problem.vehicle), settings.clearance_weight)
 
 
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:

@@ -260,14 +260,14 @@ def status_message(node: str, status: Status, message: str, *, request: str = ""
 
 
 def _figures(plan: Plan | None) -> dict[str, object]:
-    names = ("found_by", "planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "time_to_first",
-             "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit", "seed")
+    names = ("found_by", "planner", "samples", "tree_nodes", "path_length", "lower_bound", "gap", "cost", "cost_lower_bound",
+             "cost_gap", "time_to_first", "time_to_found", "planning_time", "min_clearance", "max_curvature", "audit", "seed")
     if plan is None:
         return dict.fromkeys(names)
     return dict(zip(names, (
         plan.found_by, plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.lower_bound, plan.gap,
-        plan.time_to_first, plan.time_to_found, plan.planning_time, plan.min_clearance, plan.max_curvature, plan.audit,
-        plan.settings.seed,
+        plan.cost, plan.cost_lower_bound, plan.cost_gap, plan.time_to_first, plan.time_to_found, plan.planning_time,
+        plan.min_clearance, plan.max_curvature, plan.audit, plan.settings.seed,
     ), strict=True))
 
 
@@ -289,7 +289,7 @@ def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
         return DiagnosticStatus.OK
     compared = 2 if plan.problem.any_goal_heading else 3
     approximate = not plan.problem.exact_goal and plan.path.end[:compared] != plan.problem.goal[:compared]
-    return DiagnosticStatus.WARN if approximate or plan.cancelled or plan.start_too_near else DiagnosticStatus.OK
+    return DiagnosticStatus.WARN if approximate or plan.cancelled else DiagnosticStatus.OK
 
 
 def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:

@@ -17,6 +17,9 @@ from .settings import MAX_PLANNING_TIME, Settings
 from .text import quoted
 from .vehicle import Vehicle
 
+#: Settings that a document of an earlier version lacks, as that version planned.
+BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0}
+
 
 class PlanFileError(PlanningError, ValueError):
     """A document that holds no plan; the message says what is wrong with it."""
@@ -37,7 +40,8 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "time_to_first": _number(plan.time_to_first), "time_to_found": _number(plan.time_to_found),
         "planning_time": _number(plan.planning_time),
         "map_time": _number(plan.map_time), "length": _number(plan.length), "lower_bound": _number(plan.lower_bound),
-        "gap": _number(plan.gap), "min_clearance": _number(plan.min_clearance),
+        "gap": _number(plan.gap), "cost": _number(plan.cost), "cost_lower_bound": _number(plan.cost_lower_bound),
+        "cost_gap": _number(plan.cost_gap), "min_clearance": _number(plan.min_clearance),
         "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
         "poses": plan.poses().tolist(),
@@ -80,7 +84,7 @@ def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, 
     request = {item.name: fields.pop(item.name) for item in options(Problem) if item.name in fields}
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
     problem = Problem(world_map, vehicle, start, goal, **request)
-    fields = _known(Settings, fields, "settings")
+    fields = _known(Settings, BEFORE | fields, "settings")
     drawn = _field(document, "samples", int)
     return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"]})
 

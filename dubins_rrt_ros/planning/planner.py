@@ -15,18 +15,17 @@ from .collision.clearance import ClearanceField
 from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
-from .departure import find_departure
 from .diagnosis import explain
 from .problem import Problem
 from .result import Plan, Progress, Status, gap_above, reaches_goal
-from .search.cost import path_cost
+from .search.cost import Objective
 from .search.cost_to_go import CostToGo
 from .search.headings import FOLLOW_COST_TO_GO
 from .search.known_path import KnownPath
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
-from .settings import MIN_PLANNING_TIME, Settings
+from .settings import Settings
 from .world import World, prepare
 
 #: Maximum time between two reports of progress [s].
@@ -94,13 +93,26 @@ def _ignore(progress: Progress) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Audited:
-    """A path that passed its audit, with the search as it was then."""
+    """A path that passed its audit, with the search as it was then.
+
+    Attributes:
+        cost: the cost of the path [m].
+        found: the best path of the search, of which this one is a simpler form, or the same.
+        is_simple: False where the path was not simplified, since the first one is not to wait for that.
+    """
 
     path: Path
     audit: Audit
     tree: Tree
     samples: int
     found_by: str = ""
+    cost: float = 0.0
+    found: Path | None = None
+    is_simple: bool = True
+
+    def improves(self, other: "_Audited | None") -> bool:
+        """Return True if this is worth a report after the other."""
+        return other is None or self.is_simple > other.is_simple or self.cost < other.cost - LEAST_IMPROVEMENT
 
 
 class _Call:
@@ -113,10 +125,11 @@ class _Call:
         self._problem, self._settings, self._on_progress, self._seed_path = problem, settings, on_progress, seed_path
         self._deadline = Deadline(settings.planning_time, cancel)
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
-        self._bound = lower_bound(problem)
+        self._bound = self._cost_bound = lower_bound(problem)
         self._obstacles: Obstacles | None = None  # until the world is ready
         self._best: _Audited | None = None
-        self._audit_took = 0.0
+        self._audit_took = self._simplifying_took = 0.0
+        self._found_cost = math.inf  # of the best path of the search that was audited last
         self._last_audit, self._last_report = -math.inf, 0.0  # when they ended [s]
         self._time_to_first: float | None = None
         self._time_to_found: float | None = None
@@ -134,27 +147,11 @@ class _Call:
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
         if diagnosis := explain.before_search(self._problem, field):
-            if diagnosis.status == Status.START_OCCUPIED and self._problem.start_slack > 0:
-                return self._leave_start(field, diagnosis.message)
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
         if reaches_goal(self._problem.start, self._problem, rounding=SAME):
             self._time_to_found = self._elapsed
             return self._answer_with(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
-
-    def _leave_start(self, field: ClearanceField, occupied: str) -> Plan:
-        """Return the plan from a start that is too near to an obstacle, or why there is none."""
-        problem = self._problem
-        departure = find_departure(problem, field, occupied, self._deadline.check)
-        if self._deadline.cancelled:
-            return self._cancelled(self._root, 0)
-        if departure.path is None:
-            return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
-        settings = replace(self._settings, planning_time=max(MIN_PLANNING_TIME, self._deadline.left))
-        found = plan(departure.rest(problem), settings, cancel=self._deadline.cancel, seed_path=self._seed_path,
-                     on_progress=lambda report: self._on_progress(departure.progress(report, problem)),
-                     report_samples=self._report_samples)
-        return replace(departure.joined(found, problem), settings=self._settings, map_time=self._map_time)
 
     def _is_cancelled(self) -> bool:
         self._deadline.poll()
@@ -198,7 +195,7 @@ class _Call:
 
     def _report(self, search: Search) -> None:
         """Report a better path, once it is shortened and audited, and the state of the search from time to time."""
-        improved = search.ready and self._is_audit_due(search.cost) and self._is_right(search.path, search)
+        improved = search.ready and self._is_audit_due(search) and self._is_right(search.path, search)
         if improved or self._is_report_due(search.samples):
             self._tell(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
 
@@ -213,11 +210,11 @@ class _Call:
         length = self._best.path.length if self._best else None
         self._on_progress(Progress(samples, self._last_report, length, improved, snapshot, tree))
 
-    def _is_audit_due(self, cost: float) -> bool:
-        """Return True if a path of this cost is better than the best that was audited, and the last audit is long enough ago."""
+    def _is_audit_due(self, search: Search) -> bool:
+        """Return True if the best path is better than the one that was audited last, and the last audit is long enough ago."""
         if self._best is None:
             return True
-        return (cost < path_cost(self._best.path) - LEAST_IMPROVEMENT
+        return (search.cost < self._found_cost - LEAST_IMPROVEMENT
                 and self._elapsed - self._last_audit >= AUDIT_INTERVAL * self._audit_took)
 
     def _is_right(self, path: Path | None, search: Search) -> bool:
@@ -225,22 +222,41 @@ class _Call:
         if path is None:
             return False
         try:
-            audit = self._audit(path)
+            audited = self._audited(path, search, simplify=self._best is not None)
         except OutOfTime:
             return False
-        if audit.ok:
-            self._keep(_Audited(path, audit, search.tree, search.samples, search.found_by))
-        return audit.ok
+        if audited.audit.ok and audited.improves(self._best):
+            self._keep(audited)
+            return True
+        return False
+
+    def _audited(self, path: Path, search: Search, simplify: bool = True) -> _Audited:
+        """Simplify and audit a path once: an improvement that was reported is often the answer too."""
+        simple = path
+        if simplify and not search.objective.is_length:
+            known = self._best if self._best and self._best.is_simple and self._best.found == path else None
+            simple = known.path if known else self._simplified(search)
+        self._found_cost = search.cost
+        return _Audited(simple, self._audit(simple), search.tree_with(simple), search.samples, search.found_by,
+                        search.objective.path_cost(simple), path, simplify or search.objective.is_length)
+
+    def _simplified(self, search: Search) -> Path:
+        """Return a simpler form of the best path, for which there is time kept once it is known how long that takes."""
+        self._deadline.reserve = AUDIT_RESERVE * self._audit_took
+        began = self._elapsed
+        simple = search.simplified()
+        self._simplifying_took = self._elapsed - began
+        return simple
 
     def _audit(self, path: Path) -> Audit:
-        """Audit a path once: an improvement that was reported is often the answer too."""
+        """Audit a path, unless that was done last."""
         if self._best and self._best.path == path:
             return self._best.audit
         began = self._elapsed
         audit = audit_path(path, self._problem, self._obstacles, self._deadline.check)
         self._last_audit = self._elapsed
         self._audit_took = self._last_audit - began
-        self._deadline.reserve = AUDIT_RESERVE * self._audit_took
+        self._deadline.reserve = AUDIT_RESERVE * self._audit_took + self._simplifying_took
         return audit
 
     def _keep(self, audited: _Audited) -> None:
@@ -250,12 +266,14 @@ class _Call:
 
     def _cost_to_go_if_needed(self, field: ClearanceField) -> CostToGo | None:
         needed = self._settings.informed or self._settings.heading_sampling in FOLLOW_COST_TO_GO
-        return CostToGo.to_goal(self._problem, field) if needed else None
+        return CostToGo.to_goal(self._problem, field, Objective.of(self._problem, self._settings, field)) if needed else None
 
     def _snapshot(self, search: Search) -> Plan:
         """Return the plan of a search that goes on."""
         if search.bound:
-            self._bound = lower_bound(self._problem, search.bound)
+            self._cost_bound = lower_bound(self._problem, search.bound)
+            if search.objective.is_length:
+                self._bound = self._cost_bound
         if self._best:
             return self._with_path(self._best, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.size)}."
@@ -268,7 +286,7 @@ class _Call:
             return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
         before = self._best
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
-        if self._best and (before is None or path_cost(self._best.path) < path_cost(before.path) - LEAST_IMPROVEMENT):
+        if self._best and self._best.improves(before):
             self._on_progress(Progress(answer.samples, answer.planning_time, answer.length, True, lambda: answer,
                                        lambda: answer.tree))
         return answer
@@ -276,16 +294,16 @@ class _Call:
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
         """Return the plan with the best path; without it where it fails its audit, with the one before where the time is up."""
         try:
-            audit = self._audit(path)
+            audited = self._audited(path, search) if search else _Audited(path, self._audit(path), tree, samples)
         except OutOfTime:
             return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples, cancelled)
-        if not audit.ok:
-            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audit)
-        audited = _Audited(path, audit, tree, samples, search.found_by if search else "")
+        if not audited.audit.ok:
+            message = f"A defect in the planner: its path failed the audit: {audited.audit}. Please report it."
+            return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audited.audit)
         self._keep(audited)
-        if search:
-            self._bound = lower_bound(self._problem, search.make_bound(self._time_for_bound()))
+        if search and (bound := search.make_bound(self._time_for_bound())):
+            self._cost_bound = lower_bound(self._problem, bound)
+            self._bound = lower_bound(self._problem, search.make_length_bound())
         return self._with_path(self._best or audited, cancelled)
 
     def _time_for_bound(self) -> float:
@@ -327,19 +345,24 @@ class _Call:
     def _with_path(self, best: _Audited, cancelled: bool = False, running: bool = False) -> Plan:
         """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
-        bound, elapsed = min(self._bound, best.path.length), self._elapsed
-        message = self._success_message(best.path, best.found_by, bound, best.samples, elapsed, cancelled, running)
+        bound, cost_bound, elapsed = min(self._bound, best.path.length), min(self._cost_bound, best.cost), self._elapsed
+        message = self._success_message(best, bound, cost_bound, elapsed, cancelled, running)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
-                          audit=best.audit, found_by=best.found_by, lower_bound=bound, planning_time=elapsed)
+                          audit=best.audit, found_by=best.found_by, lower_bound=bound, cost=best.cost,
+                          cost_lower_bound=cost_bound, planning_time=elapsed)
 
-
-    def _success_message(self, path: Path, found_by: str, bound: float, samples: int, elapsed: float, cancelled: bool,
-                         running: bool) -> str:
+    def _success_message(self, best: _Audited, bound: float, cost_bound: float, elapsed: float, cancelled: bool, running: bool
+                         ) -> str:
         """Return what was found, in a sentence."""
+        path, found_by, samples = best.path, best.found_by, best.samples
         so_far = " so far" if running else ""
         gap = gap_above(bound, path.length)
         least = "the Dubins curve without obstacles" if self._problem.vehicle.required_clearance < 0 else "the shortest possible"
         above = f", at most {100 * gap:.1f} % above {least}" if math.isfinite(gap) else ""
+        if self._settings.preferred_clearance_of(self._problem.vehicle) > 0:
+            gap = gap_above(cost_bound, best.cost)
+            above = f" with a cost of {best.cost:.2f} m"
+            above += f", at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else ""
         end = "cancelled after " if cancelled else "after "
         before = f"{'cancelled ' if cancelled else ''}before the first sample"
         drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else before
@@ -355,6 +378,6 @@ class _Call:
         return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
-        figures = {"lower_bound": self._bound, "planning_time": self._elapsed} | more
+        figures = {"lower_bound": self._bound, "cost_lower_bound": self._cost_bound, "planning_time": self._elapsed} | more
         return Plan(status, message, self._problem, self._settings, tree, time_to_first=self._time_to_first,
                     time_to_found=self._time_to_found, map_time=self._map_time, **figures)

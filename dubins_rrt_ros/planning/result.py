@@ -16,7 +16,6 @@ from .errors import PlanningError
 from .maps.model import GridMap
 from .pictures import Plottable, check_matplotlib
 from .problem import Pose, Problem, Waypoint
-from .search.cost import path_cost
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
@@ -68,10 +67,11 @@ class Plan(Plottable):
         planning_time: time from request to answer, the preparation of the map not counted [s].
         map_time: time for the preparation of the map, and for loading it where the caller added that [s].
         lower_bound: no path of the problem is shorter [m].
+        cost: what was minimised, of the path [m]: its length where preferred_clearance is 0; None without a path.
+        cost_lower_bound: no path of the problem costs less [m].
         found_by: what found the path, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one, and
             where nothing had to be searched.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
-        start_too_near: True if the path leaves a start that is nearer to an obstacle than allowed, as `start_slack` says.
         waypoints: the waypoints that the path was to pass, as they were asked for.
         waypoint_indices: index among `poses` of each waypoint; empty without a path.
     """
@@ -90,9 +90,10 @@ class Plan(Plottable):
     planning_time: float = 0.0
     map_time: float = 0.0
     lower_bound: float = 0.0
+    cost: float | None = None
+    cost_lower_bound: float = 0.0
     found_by: str = ""
     audit: Audit | None = None
-    start_too_near: bool = False
     waypoints: tuple[Waypoint, ...] = ()
     waypoint_indices: tuple[int, ...] = ()
 
@@ -136,6 +137,11 @@ class Plan(Plottable):
     def gap(self) -> float | None:
         """The ratio length / lower_bound - 1: 0 for a path of length 0, infinite for a bound of 0, None without a path."""
         return None if self.path is None else gap_above(self.lower_bound, self.path.length)
+
+    @property
+    def cost_gap(self) -> float | None:
+        """The ratio cost / cost_lower_bound - 1, as `gap` is that of the length."""
+        return None if self.cost is None else gap_above(self.cost_lower_bound, self.cost)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw map, tree, path and vehicle, or why there is no path, on axes or in a new pyplot figure, and return the axes.
@@ -197,6 +203,10 @@ class Plan(Plottable):
                   f"and the least clearance is {audit.min_clearance} m"
         if self.lower_bound > path.length * (1 + ROUNDING):
             yield f"the path is {path.length} m long, less than the lower bound {self.lower_bound} m"
+        if self.cost is None or not path.length <= self.cost * (1 + ROUNDING):
+            yield f"the path is {path.length} m long, and its cost is {self.cost} m"
+        elif self.cost_lower_bound > self.cost * (1 + ROUNDING):
+            yield f"the cost of the path is {self.cost} m, less than the lower bound {self.cost_lower_bound} m"
         if self.time_to_first is None or not 0 <= self.time_to_first <= self.planning_time:
             yield f"the first path came after {self.time_to_first} s of {self.planning_time} s"
         elif self.time_to_found is None or not 0 <= self.time_to_found <= self.time_to_first:
@@ -214,7 +224,7 @@ class Plan(Plottable):
 
     def _is_in_tree(self, path: Path) -> bool:
         """Return True if a node of the tree is reached by just this path."""
-        ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == path_cost(path))
+        ends = (self.tree.poses == path.end).all(axis=1) & (self.tree.costs == self.cost)
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
 
 

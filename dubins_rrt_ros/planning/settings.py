@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from .option import OptionError, convert_options, documented, option
+from .vehicle import Vehicle
 
 #: Maximum planning_time [s].
 MAX_PLANNING_TIME = 3600.0
-#: Minimum planning_time [s].
-MIN_PLANNING_TIME = 0.001
 #: Minimum path_spacing, where it is not 0 [m].
 MIN_SPACING = 0.001
 #: The options of the paper's plain algorithms.
@@ -28,7 +27,7 @@ class Settings:
                           choices=("rrt", "rrt_star"))
     samples: int = option(3000, "number of samples after which a search that has a path ends; the maximum with informed: false",
                           low=1, high=10_000_000)
-    planning_time: float = option(1.0, "time limit", unit="s", low=MIN_PLANNING_TIME, high=MAX_PLANNING_TIME)
+    planning_time: float = option(1.0, "time limit", unit="s", low=0.001, high=MAX_PLANNING_TIME)
     goal_bias: float = option(0.05, "share of the samples drawn at the goal", low=0.0, high=1.0)
     step_size: float = option(0.0, "maximum length of an edge, also when rewired; 0 is unlimited", unit="m", low=0.0, high=1e6)
     heading_sampling: str = option(
@@ -36,6 +35,11 @@ class Settings:
         "there around obstacles; mixed, a fifth uniform, the others near field", choices=("uniform", "goal", "field", "mixed"))
     informed: bool = option(True, "find a first path by hybrid A*, then have rrt_star sample only where it can become shorter")
     shortcut: bool = option(True, "shorten each best path by Dubins shortcuts and vertex perturbation, and grow the tree from it")
+    preferred_clearance: float = option(
+        0.0, "distance of the vehicle's outline from the nearest obstacle below which a metre costs more; 0 seeks the shortest "
+        "path, -1 is the inscribed radius; without effect with informed: false", unit="m", low=-1.0, high=1000.0)
+    clearance_weight: float = option(2.0, "extra cost of a metre in contact: a metre costs 1 + clearance_weight * "
+                                     "(1 - room / preferred_clearance)^2", low=0.0, high=100.0)
     path_spacing: float = option(0.0, "maximum distance between two poses of a published path; 0 is the smaller of a cell (of a "
                                  "polygon map a quarter of the inscribed radius) and a tenth of the turning radius, and at least "
                                  "0.01", unit="m", low=0.0, high=1000.0)
@@ -45,6 +49,15 @@ class Settings:
         convert_options(self)
         if 0 < self.path_spacing < MIN_SPACING:
             raise OptionError(f"path_spacing is {self.path_spacing:g}; give 0 or at least {MIN_SPACING:g} [m]")
+        if -1 < self.preferred_clearance < 0:
+            raise OptionError(f"preferred_clearance is {self.preferred_clearance:g}; give a distance [m], 0 for the shortest "
+                              "path, or -1 for the inscribed radius")
+
+    def preferred_clearance_of(self, vehicle: Vehicle) -> float:
+        """Return the room that a vehicle prefers [m]; 0 where the cost is the length."""
+        if not self.informed or self.clearance_weight == 0:
+            return 0.0
+        return vehicle.inscribed_radius if self.preferred_clearance == -1 else self.preferred_clearance
 
     @classmethod
     def paper(cls, **others: Any) -> "Settings":

@@ -20,17 +20,17 @@ from .curves import dubins
 from .curves.angles import heading_error, position_error, wrap
 from .curves.path import Path
 from .deadline import Deadline, never
-from .departure import find_departure
 from .planner import SAME, plan, with_seed
 from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
+from .search.cost import Objective
 from .search.cost_to_go import CostToGo
 from .search.hybrid_astar import HybridAStarRuns
 from .search.known_path import KnownPath
 from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
-from .settings import MIN_PLANNING_TIME, Settings
+from .settings import Settings
 from .world import World, prepare
 
 #: Number of headings that are tried at a waypoint.
@@ -91,6 +91,7 @@ class _Call:
         if not isinstance(world, World):
             world = prepare(problem.map, problem.vehicle, problem.allow_unknown)
         self._world, self._problem = world, replace(problem, world=world)
+        self._objective = Objective.of(self._problem, settings, world.field)
         self._map_time = self._clock.elapsed
         self._clock.restart()
         self._samples = 0
@@ -105,8 +106,6 @@ class _Call:
         stops = list(_stops(self._problem, self._waypoints))
         if len(stops) < 3:
             return self._single_leg(stops)
-        if not self._world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
-            return self._leave_start(stops)
         if unreachable := self._without_room(stops):
             return unreachable
         legs = [self._leg(here, there) for here, there in pairwise(stops)]
@@ -127,23 +126,6 @@ class _Call:
         ends = (0, len(answer.poses()) - 1)
         indices = [end for stop, end in zip(stops, ends, strict=False) for _ in stop.waypoints]
         return replace(answer, map_time=self._map_time, waypoint_indices=tuple(indices) if answer.path else ())
-
-    def _leave_start(self, stops: list[_Stop]) -> Plan:
-        """Return the plan from a start that is too near to an obstacle, or why there is none."""
-        problem = self._problem
-        occupied = self._leg_plan(self._leg(*stops[:2]))
-        if occupied.status != Status.START_OCCUPIED:
-            return self._no_way(stops[1], occupied)
-        departure = find_departure(problem, self._world.field, occupied.message, self._clock.check)
-        if departure.path is None:
-            return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
-        passed = len(stops[0].waypoints)
-        rest = plan_through(departure.rest(problem), self._waypoints[passed:],
-                            replace(self._settings, planning_time=self._time(1.0)), cancel=self._cancel)
-        answer = departure.joined(rest, problem)
-        later = len(answer.poses()) - len(rest.poses())
-        indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
-        return replace(answer, waypoint_indices=indices, settings=self._settings, map_time=self._map_time)
 
     def _without_room(self, stops: list[_Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
@@ -211,7 +193,7 @@ class _Call:
         if path is None:
             return False
         for first_round in (True, False):
-            path = smooth(path, vehicle, field, self._rng, first_round, self._clock.poll)
+            path = smooth(path, vehicle, field, self._rng, first_round, self._clock.poll, self._objective)
         self._found_by = "hybrid_astar"
         leg.add(path)
         return True
@@ -224,7 +206,7 @@ class _Call:
 
     def _time(self, share: float) -> float:
         """Return a share of the time that is left, as a limit [s]."""
-        return max(MIN_PLANNING_TIME, share * self._clock.left)
+        return max(0.001, share * self._clock.left)
 
     # Legs
 
@@ -241,7 +223,7 @@ class _Call:
     def _smoothed(self, path: Path) -> Path:
         if _is_shortest(path) or self._clock.is_over:
             return path
-        return smooth(path, self._problem.vehicle, self._world.field, self._rng, False, self._clock.poll)
+        return smooth(path, self._problem.vehicle, self._world.field, self._rng, False, self._clock.poll, self._objective)
 
     def _with_best_heading(self, before: Path, after: Path, most: float) -> list[Path]:
         """Return two legs with the heading between them that makes them cheapest, of those up to `most` [rad] off the present."""
@@ -252,7 +234,13 @@ class _Call:
         best = int(np.argmin(off.costs + onto.costs))
         if not off.costs[best] + onto.costs[best] < arriving.cost + leaving.cost - SAME:
             return [before, after]
-        return [arriving.from_start(poses[best], off.indices[best]), leaving.to_end(poses[best], onto.indices[best])]
+        turned = [arriving.from_start(poses[best], off.indices[best]), leaving.to_end(poses[best], onto.indices[best])]
+        if not self._objective.is_length and self._cost(turned) >= self._cost([before, after]):
+            return [before, after]
+        return turned
+
+    def _cost(self, paths: list[Path]) -> float:
+        return sum(map(self._objective.path_cost, paths))
 
     def _planned(self, paths: list[Path]) -> list[Path]:
         """Plan the legs that may become shorter, with equal shares of the samples, from the paths that are known."""
@@ -268,7 +256,7 @@ class _Call:
                                planning_time=self._time(0.9 / left))
             found = plan(problem, settings, cancel=self._cancel, seed_path=paths[n])
             self._samples += found.samples
-            if found.path and found.path.length < paths[n].length:
+            if found.path and self._cost([found.path]) < self._cost([paths[n]]):
                 paths[n] = found.path
         return paths
 
@@ -279,16 +267,18 @@ class _Call:
         path = Path.of_curves(self._problem.start, paths[-1].end, [curve for leg in paths for curve in leg.curves])
         audit = audit_path(path, self._problem, self._world.obstacles)
         audit = Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
+        tree = Tree.of_path(path, self._objective.curve_costs(path))
         if not audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return self._plan(Status.UNKNOWN, message, Tree.of_path(path), audit=audit)
+            return self._plan(Status.UNKNOWN, message, tree, audit=audit)
         if self._time_to_first is None:
             self._time_to_first = self._clock.elapsed
         count = len(self._waypoints)
         message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
                    f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s.")
-        answer = self._plan(Status.NONE, message, Tree.of_path(path), path=path, audit=audit, samples=self._samples,
-                            lower_bound=min(self._lower_bound(), path.length), found_by=self._found_by,
+        bound = min(self._lower_bound(), path.length)
+        answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
+                            cost=float(tree.costs[-1]), cost_lower_bound=bound, found_by=self._found_by,
                             cancelled=self._clock.cancelled)
         return replace(answer, waypoint_indices=tuple(_indices(stops, paths, answer.poses())))
 

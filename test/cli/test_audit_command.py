@@ -1,6 +1,7 @@
 """`dubins_rrt audit`, by what it prints, writes and returns."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.planning import PolygonMap, Problem, Settings, Vehicle, plan, rasterise, save_map
+from dubins_rrt_ros.planning import PolygonMap, Problem, Settings, Vehicle, load_map, plan, rasterise, save_map
 from dubins_rrt_ros.planning.plan_file import to_document
 
 HALL = shapely.box(0, 0, 12, 10).difference(shapely.box(5, 0, 6, 6))
@@ -120,7 +121,8 @@ def test_every_joint_of_a_plan_is_among_its_poses(document, capsys):
 
 @pytest.mark.parametrize(("field", "value"), [
     ("length", 12.0), ("length", "long"), ("length", None), ("lower_bound", 1e3), ("lower_bound", -1.0), ("lower_bound", 1.0),
-    ("gap", 0.0), ("gap", None), ("min_clearance", 1.5), ("max_curvature", 0.5), ("error_code", 208), ("error_name", "TIMEOUT"),
+    ("gap", 0.0), ("gap", None), ("cost", None), ("cost_lower_bound", 99.0), ("cost_gap", 0.0),
+    ("min_clearance", 1.5), ("max_curvature", 0.5), ("error_code", 208), ("error_name", "TIMEOUT"),
     ("audit", "fine"), ("map_id", "0123456789ab"), ("planner", "rrt"), ("seed", 99)])
 def test_a_figure_that_is_not_the_path_s_is_found(document, field, value, capsys):
     status, out, _ = run(write(document | {field: value}), "hall.wkt", capsys=capsys)
@@ -129,11 +131,23 @@ def test_a_figure_that_is_not_the_path_s_is_found(document, field, value, capsys
     assert field in finding or (field == "lower_bound" and finding.startswith("gap is "))
 
 
+def test_the_cost_of_clearance_is_measured_anew(capsys):
+    """A mile from a wall a metre costs a metre; along a wall it costs more, and a document has to say how much."""
+    world = load_map("hall.wkt")
+    problem = Problem(world, Vehicle(robot_radius=0.3), (2.0, 2.0, math.pi / 2), (9.0, 2.0, -math.pi / 2))
+    found = to_document(plan(problem, Settings(seed=1, samples=50, planning_time=60.0, preferred_clearance=3.0)), "hall.wkt")
+    assert found["cost"] > 1.05 * found["length"] and found["cost_lower_bound"] <= found["cost"]
+    assert run(write(found), "hall.wkt", capsys=capsys)[0] == 0
+    for share in (0.99, 1.01):
+        status, out, _ = run(write(found | {"cost": share * found["cost"]}), "hall.wkt", capsys=capsys)
+        assert status == 1 and f"cost is {share * found['cost']:.6g}"[:10] in out
+
+
 def test_what_is_not_judged_is_named(document, capsys):
     file = write(document | {"colour": "red"})
     status, out, _ = run(file, "hall.wkt", "--json", "verdict.json", capsys=capsys)
     named = ["message", "found_by", "samples", "tree_nodes", "time_to_first", "time_to_found", "planning_time", "map_time",
-             "lower_bound (that no path is shorter)", "map", "version", "colour"]
+             "lower_bound (that no path is shorter)", "cost_lower_bound (that no path costs less)", "map", "version", "colour"]
     assert status == 0 and out.endswith(f"Not judged: {', '.join(named)}.\n")
     assert json.loads(Path("verdict.json").read_text())["not_judged"] == named
     status, out, _ = run(file, "hall.wkt", "--robot-radius", "0.25", capsys=capsys)

@@ -13,8 +13,8 @@ from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
 from dubins_rrt_ros.planning.text import LONGEST
 
-FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "min_clearance",
-           "max_curvature")
+FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "cost",
+           "cost_lower_bound", "cost_gap", "min_clearance", "max_curvature")
 FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES, "audit",
           "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}
 

@@ -9,6 +9,7 @@ from support import naive
 from support.cases import SCALE, arrays_of, empty_map, field_of, interpreted, needs_compiled, random_maps, random_problem, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Path, Problem, Settings, Vehicle, audit_path, load_map
+from dubins_rrt_ros.planning._kernels.edge_cost import EdgeCost
 from dubins_rrt_ros.planning._kernels.hybrid_astar import HybridAStar
 from dubins_rrt_ros.planning.curves.dubins import WORDS, shortest
 from dubins_rrt_ros.planning.maps.locate import maps_directory
@@ -38,8 +39,9 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
     """One run."""
     field, corners = field_of(problem), problem.map.corners()
     radius = problem.vehicle.turning_radius
-    return HybridAStar(checker=field.collision_checker(problem.vehicle), radius=radius, start=problem.start,
-                       goals=np.array([problem.goal]), to_goal=CostToGo.to_goal(problem, field).kernel,
+    to_goal = CostToGo.to_goal(problem, field).kernel
+    return HybridAStar(checker=field.collision_checker(problem.vehicle), edge_cost=EdgeCost(), radius=radius,
+                       start=problem.start, goals=np.array([problem.goal]), to_goal=to_goal, length_to_goal=to_goal,
                        corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=sectors,
                        weight=weight, visit_penalty=visit_penalty, limit=limit, max_expanded=most)
 

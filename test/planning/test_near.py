@@ -9,6 +9,7 @@ from support import naive
 from support.cases import SCALE, boxes_grid, empty_map, holed_polygons, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, Tree, Vehicle
+from dubins_rrt_ros.planning._kernels.edge_cost import EdgeCost
 from dubins_rrt_ros.planning._kernels.near import takes_half_circle
 from dubins_rrt_ros.planning._kernels.rrt import RrtKernel
 from dubins_rrt_ros.planning._kernels.tree import SearchTree
@@ -28,8 +29,9 @@ class Inner:
         corners = map.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.grown = SearchTree(root=root, radius=radius, corner=low, extent=high - low)
-        self.grower = RrtKernel(tree=self.grown, checker=self.field.collision_checker(VEHICLE), step=step,
-                                near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=(1e6, 1e6, 0.0), tolerance_xy=0.0,
+        self.grower = RrtKernel(tree=self.grown, checker=self.field.collision_checker(VEHICLE),
+                                edge_cost=EdgeCost(), step=step, near_factor=NEAR_FACTOR, max_near=MOST_NEAR,
+                                goal=(1e6, 1e6, 0.0), tolerance_xy=0.0,
                                 tolerance_yaw=0.0)
 
     def add(self, sample, algorithm="rrt_star"):

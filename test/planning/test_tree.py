@@ -104,14 +104,16 @@ CORRUPTIONS = {
     "cycle of two": ("below a cycle", lambda t: corrupted(t, "parents", *node_above(t))),
     "cost by a nanometre": ("the cost of node 7 is not", lambda t: corrupted(t, "costs", 7, t.costs[7] + 1e-9)),
     "cost not a number": ("the cost of node", lambda t: corrupted(t, "costs", 7, math.nan)),
-    "length by a nanometre": ("the cost of node 3", lambda t: corrupted(t, "lengths", (3, 1), t.lengths[3, 1] + 1e-9)),
+    "length by a nanometre": ("the edge to node 3 costs less than its length",
+                              lambda t: corrupted(t, "lengths", (3, 1), t.lengths[3, 1] + 1e-9)),
     "pose by 1e-7 m": ("edge to node", lambda t: corrupted(t, "poses", (3, 0), t.poses[3, 0] + 1e-7)),
     "heading by 1e-7 rad": ("edge to node", lambda t: corrupted(t, "poses", (3, 2), t.poses[3, 2] + 1e-7)),
     "pose not a number": ("edge to node", lambda t: corrupted(t, "poses", (3, 0), math.nan)),
     "heading not a number": ("edge to node", lambda t: corrupted(t, "poses", (3, 2), math.nan)),
     "another word": ("edge to node", with_another_word),
     "another radius": ("edge to node", lambda t: replace(t, radius=1.01 * t.radius)),
-    "no nodes": ("no root", lambda t: Tree(1.0, *(a[:0] for a in (t.poses, t.parents, t.costs, t.words, t.lengths)))),
+    "no nodes": ("no root", lambda t: Tree(1.0, *(a[:0] for a in (t.poses, t.parents, t.costs, t.words, t.lengths,
+                                                             t.edge_costs)))),
 }
 
 
@@ -125,7 +127,7 @@ def test_check_finds(small, name):
 def test_check_finds_arcs_of_negative_length():
     """Driven backwards and forwards again an edge ends where it should, and costs what it should."""
     tree = Tree(1.0, np.array([[0.0, 0, 0], [2, 0, 0]]), np.array([-1, 0], np.int32), np.array([0.0, 2.0]),
-                np.zeros(2, np.int8), np.array([[0.0, 0, 0], [0.0, 2.0, 0.0]]))
+                np.zeros(2, np.int8), np.array([[0.0, 0, 0], [0.0, 2.0, 0.0]]), np.array([0.0, 2.0]))
     tree.check()
     there_and_back = replace(tree, lengths=np.array([[0.0, 0, 0], [-math.tau, 2.0, math.tau]]))
     with pytest.raises(TreeError):

@@ -7,7 +7,7 @@ cdef class CostToGoKernel:
     cdef readonly tuple shape
     cdef readonly double side
     cdef Clearance clearance
-    cdef object squares
+    cdef object squares, slowness
     cdef Eikonal equation, flat
     cdef double column, row, tolerance, deduction
     cdef readonly bint is_bound

@@ -1,12 +1,13 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Cost-to-go around obstacles: a lower bound of the length of any path of a disc that can turn on the spot.
+"""Cost-to-go around obstacles: a lower bound of the cost of any path of a disc that can turn on the spot.
 
 The map is divided into squares, each a block of the clearance's cells. On those that may hold a free point the cost is that of
-`Eikonal`: continuous, and linear on triangles. It is symmetric, so the source may be the goal (cost-to-go) or the start.
+`Eikonal`: continuous, and linear on triangles. It is symmetric, so the source may be the goal (cost-to-go) or the start. A metre
+in a square costs its slowness: 1 where the cost is the length.
 
-Proof of the bound. No triangle has a gradient above 1, and at the source the cost is at most 0. A path of the disc stays within
-squares that may hold a free point, and the cost is continuous where two of these meet, in an edge or a node. So along the path
-the cost rises by at most a metre per metre, however the nodes got their costs.
+Proof of the bound. No triangle has a gradient above its square's slowness, at most what a metre there costs, and at the source
+the cost is at most 0. A path of the disc stays within squares that may hold a free point, and the cost is continuous where two of
+these meet, in an edge or a node. So along the path the cost rises by at most what the path costs, however the nodes got theirs.
 """
 
 import cython
@@ -47,6 +48,46 @@ def free_squares(clearance: Clearance, block: cython.int, required_clearance: cy
     return found
 
 
+def greatest_clearances(clearance: Clearance, block: cython.int, free: cython.schar[:, ::1], enough: cython.double,
+                        parts: cython.int, farther: cython.double):
+    """Bound the clearance anywhere in each of the `free_squares`, by that in the middles of `parts` x `parts` parts of it.
+
+    Args:
+        block, free: as for `free_squares`.
+        enough: clearance above which it does not matter [m].
+        farther: added to the clearances in the middles, in diagonals of a part: 0.5 makes an upper bound.
+
+    Returns:
+        Like `free_squares`, float64 [m]; 0 for other squares.
+    """
+    found = np.zeros((free.shape[0], free.shape[1]))
+    out: cython.double[:, ::1] = found
+    side: cython.double = block * clearance.resolution / parts
+    row: cython.int
+    column: cython.int
+    part: cython.int
+    x: cython.double
+    y: cython.double
+    bound: cython.double
+    farther *= side * sqrt(2.0)
+    with cython.nogil:
+        for row in range(1, cython.cast(cython.int, free.shape[0]) - 2):
+            for column in range(1, cython.cast(cython.int, free.shape[1]) - 2):
+                if not free[row, column]:
+                    continue
+                for part in range(parts * parts):
+                    # A square at the map's edge can reach beyond it.
+                    x = min(((column - 1) * parts + part % parts + 0.5) * side, clearance.width)
+                    y = min(((row - 1) * parts + part // parts + 0.5) * side, clearance.height)
+                    bound = cython.cast(cython.double, clearance.field[clearance.row_of(y), clearance.column_of(x)])
+                    if bound < enough:
+                        bound = clearance.exact(x, y)
+                    out[row, column] = max(out[row, column], bound + farther)
+                    if out[row, column] >= enough:
+                        break
+    return found
+
+
 @cython.cfunc
 @cython.nogil
 @cython.exceptval(check=False)
@@ -79,7 +120,7 @@ class CostToGoKernel:
         is_bound: whether the costs are lower bounds; before `make_bound` they can be some hundredths too high.
     """
 
-    def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double, target):
+    def __init__(self, clearance: Clearance, block: cython.int, free, source, tolerance: cython.double, target, slowness=None):
         """Start at the source.
 
         Args:
@@ -88,25 +129,27 @@ class CostToGoKernel:
             source: (x, y) in the map's frame [m].
             tolerance: radius around `source` within which the cost is 0 [m].
             target: (x, y) towards which costs are found first, or None.
+            slowness: that of the squares and of the nodes, as `Eikonal` takes it; None is 1.
         """
         self.clearance, self.side = clearance, block * clearance.resolution
         self.squares, self.shape, self.width, self.size = free, free.shape, free.shape[1], free.size
         self.tolerance, self.deduction, self.is_bound, self.flat = tolerance / self.side, 0, False, None
         self.column, self.row = self.place(source[0], source[1])
+        self.slowness = slowness
         self.use(self.started_equation(target))
 
-    def prepare_bound(self):
-        """Do the long part of `make_bound`, without a change of the costs."""
+    def prepare_bound(self, slowness=None):
+        """Do the long part of `make_bound`, without a change of the costs; `slowness` is then a lower bound of the true one."""
         if self.flat is None:
+            self.slowness = slowness
             flat: Eikonal = self.started_equation(None)
             flat.flatten()
             self.flat = flat
 
     def make_bound(self):
-        """Lower the costs to lower bounds of the lengths of paths."""
+        """Lower the costs to lower bounds of the costs of paths, which `prepare_bound` has prepared."""
         if self.is_bound:
             return
-        self.prepare_bound()
         self.use(self.flat)
         self.is_bound = True
         # The nodes around a point of the source have at most their distances to it: at the point, interpolated, sqrt(1 / 2).
@@ -114,7 +157,7 @@ class CostToGoKernel:
 
     def started_equation(self, target):
         """Return the equation, started at the source."""
-        equation: Eikonal = Eikonal(self.squares)
+        equation: Eikonal = Eikonal(self.squares, self.slowness)
         if target is not None:
             equation.aim(*self.place(target[0], target[1]))
         equation.begin(self.column, self.row, self.tolerance)

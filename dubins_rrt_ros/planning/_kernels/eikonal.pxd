@@ -8,6 +8,7 @@ cdef class Eikonal:
     cdef int width, size
     cdef readonly signed char[::1] free
     cdef readonly double[::1] cost
+    cdef double[::1] slowness
     cdef double[::1] gradient
     cdef double[::1] slope
     cdef signed char[::1] state
@@ -17,7 +18,7 @@ cdef class Eikonal:
     cdef int[::1] rank
     cdef int first, waiting, postponed, ordered, last
     cdef double limit, until, least_fall, rise, target_column, target_row
-    cdef bint has_target, has_gradients
+    cdef bint has_target, has_gradients, has_slowness
     cdef void seed(self, double column, double row, double reach) noexcept nogil
     cdef double straight_on(self, int node) noexcept nogil
     cdef void ensure_final(self, int square) noexcept nogil

@@ -1,8 +1,9 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""The eikonal equation |grad cost| = 1 on a grid of squares: distances from a source around obstacles, nowhere too steep.
+"""The eikonal equation |grad cost| = slowness on a grid of squares: costs from a source around obstacles, nowhere too steep.
 
 Each free square is split into two triangles, along the diagonal that makes the steeper one less steep; the cost is linear on
-each. Its gradient is at most 1 on every triangle, and close to 1 on almost all. Three stages compute it:
+each. Its gradient is at most the slowness on every triangle, and close to it on almost all; the slowness is 1, which makes the
+costs distances, or a number from 1 on for each square. Three stages compute it:
 
 1. First-order upwind differences, roughly in the order of the costs, as fast marching does; or, given a target, in the order of
    the cost plus the straight line to the target, as A* does, and only as far as asked.
@@ -49,12 +50,19 @@ class Eikonal:
     and of the last two are never free.
     """
 
-    def __init__(self, free):
-        """Take (rows, columns) int8, not 0 for each free square; `columns` is the width."""
+    def __init__(self, free, slowness=None):
+        """Prepare the equation.
+
+        Args:
+            free: (rows, columns) int8, not 0 for each free square; `columns` is the width.
+            slowness: what `node_slowness` returns, after the slowness of the squares it was given; None is 1.
+        """
         self.width, self.size = free.shape[1], free.size
         self.free = free.reshape(-1)
         self.cost = np.full(free.size, FAR)
-        self.has_gradients = False  # before, all gradients are 1
+        self.has_slowness = self.has_gradients = slowness is not None  # without, all gradients are 1 at first
+        if slowness is not None:
+            self.slowness, self.gradient = (array.reshape(-1) for array in slowness)
         self.state = np.zeros(free.size, np.int8)
         self.queue, self.later, self.order = np.empty((3, free.size), np.int32)
         self.rank = np.full(free.size, free.size, np.int32)
@@ -87,7 +95,8 @@ class Eikonal:
     def flatten(self):
         """Lower the costs where they are too steep. To be called once, and only without a target."""
         self.finish()
-        self.gradient, self.slope, self.has_gradients = np.ones(self.size), np.zeros(self.size), True
+        self.gradient = np.array(self.gradient) if self.has_slowness else np.ones(self.size)
+        self.slope, self.has_gradients = np.zeros(self.size), True
         _: cython.int
         with cython.nogil:
             levels: cython.double = self.limit * LEVELS  # no cost is above the limit, and none rises
@@ -268,7 +277,7 @@ class Eikonal:
         return self.rank[neighbour] <= self.last and self.cost[neighbour] > self.cost[node] + self.least_fall
 
     def find_steepest(self, steepest):
-        """Find, for each level of the cost, the greatest gradient of the squares that reach it, and at least 1."""
+        """Find, for each level of the cost, the greatest gradient of the squares that reach it in slownesses, and at least 1."""
         square: cython.int
         level: cython.int
         slope: cython.double
@@ -288,7 +297,7 @@ class Eikonal:
                 steepest[level] = max(steepest[level], slope)
 
     def compress(self, steepest, heights):
-        """Scale each level down so that no gradient exceeds 1; `heights` is working memory: the costs where levels begin."""
+        """Scale each level down so that no gradient exceeds the slowness; `heights` is working memory, where the levels begin."""
         level: cython.int
         node: cython.int
         heights[0] = 0
@@ -300,12 +309,27 @@ class Eikonal:
                 self.cost[node] = heights[level] + (self.cost[node] - level / LEVELS) / steepest[level]
 
     def steepest(self, square):
-        """Return the greater gradient of a square's triangles, at least 1."""
+        """Return the greater gradient of a square's triangles in its slownesses, at least 1."""
         upwards: cython.double
         across: cython.double
+        scale: cython.double
         upwards, across = squared_slopes(self.cost[square], self.cost[square + 1], self.cost[square + self.width],
                                          self.cost[square + self.width + 1])
+        if self.has_slowness:
+            scale = 1 / (self.slowness[square] * self.slowness[square])
+            upwards, across = upwards * scale, across * scale
         return sqrt(min(upwards, across)) if upwards > 1 and across > 1 else 1.0
+
+
+def node_slowness(free, slowness):
+    """Return the least slowness of the free squares around each node, (rows, columns) float64; 1 where there is none."""
+    least = np.full(free.shape, np.inf)
+    of_free = np.where(free != 0, slowness, np.inf)
+    for rows, columns in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        height, width = free.shape[0] - rows, free.shape[1] - columns
+        np.minimum(least[rows:, columns:], of_free[:height, :width], out=least[rows:, columns:])
+    least[np.isinf(least)] = 1
+    return least
 
 
 def squared_slopes(here, right, above, beyond):

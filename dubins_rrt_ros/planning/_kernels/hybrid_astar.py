@@ -9,6 +9,10 @@ curve to the goal is tried, unless it is so much shorter than the way around the
 The cost-to-go can lead into a passage that the vehicle cannot turn into. The search would then expand all poses in front of it,
 with every heading, before it tries another way. A visit penalty therefore raises the key of a pose with each pose that was
 expanded nearby.
+
+Where the cost is the length, the curve to the goal costs what the key says, so the first one that is free is the best. Where the
+cost is another, it may cost more than the way around crowded places; the path is then kept, and the search goes on for cheaper
+ones.
 """
 
 import cython
@@ -26,11 +30,12 @@ if cython.compiled:
         Curve,
         Pose,
         drive_from,
+        length_of,
         rounding_at,
         shortest_within,
         single_arc,
     )
-    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import edge_cost
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import EdgeCost
     from cython.cimports.dubins_rrt_ros.planning._kernels.heap import Heap
     from cython.cimports.libc.math import cos, remainder, sin
 else:
@@ -39,8 +44,8 @@ else:
     from .closed_set import UNSEEN, ClosedSet
     from .collision import CollisionChecker
     from .cost_to_go import CostToGoKernel
-    from .dubins import TWO_PI, UNLIMITED, Curve, Pose, drive_from, rounding_at, shortest_within, single_arc
-    from .edge_cost import edge_cost
+    from .dubins import TWO_PI, UNLIMITED, Curve, Pose, drive_from, length_of, rounding_at, shortest_within, single_arc
+    from .edge_cost import EdgeCost
     from .heap import Heap
 
 #: Cost in the closed set of a cell whose pose was expanded.
@@ -48,6 +53,8 @@ EXPANDED = cython.declare(cython.float, -1)
 #: Share of the way around the obstacles below which a curve to the goal is not tried. It is below 1 since the computed way can be
 #: some hundredths too long.
 LEAST_SHARE = cython.declare(cython.double, 0.95)
+#: Number of expansions after which a path that is kept is taken, though it is not good enough.
+EXPANSIONS_FOR_BETTER = cython.declare(cython.int, 8)
 #: Number of arcs from a pose: straight on, left and right.
 TURNS = cython.declare(cython.int, 3)
 
@@ -62,16 +69,18 @@ class HybridAStar:
         ended: whether a path was found, or nothing is left to expand.
     """
 
-    def __init__(self, checker: CollisionChecker, radius, start, goals, to_goal: CostToGoKernel, corner, extent, arc, sectors,
-                 weight, visit_penalty, limit, max_expanded, turning_arc=None, arc_factors=None, retry_penalty=0.0):
+    def __init__(self, checker: CollisionChecker, edge_cost: EdgeCost, radius, start, goals, to_goal: CostToGoKernel,
+                 length_to_goal: CostToGoKernel, corner, extent, arc, sectors, weight, visit_penalty, limit, max_expanded,
+                 turning_arc=None, arc_factors=None, retry_penalty=0.0, good_enough=0.0):
         """Start a search.
 
         Args:
             checker: judges every arc.
+            edge_cost: the cost of arcs and curves.
             radius: the turning radius [m].
             start: (x, y, theta).
             goals: (m, 3) poses, any of which will do.
-            to_goal: the cost-to-go around obstacles.
+            to_goal, length_to_goal: the cost-to-go around obstacles, and the length-to-go.
             corner, extent: lowest (x, y) of the map, and its size [m].
             arc: length of an arc [m]; the cells of the closed set have sides of 0.7 of that.
             sectors: number of headings that the closed set tells apart.
@@ -83,9 +92,10 @@ class HybridAStar:
             arc_factors: (n,) random factors of the lengths of arcs, used in turn; None is 1.
             retry_penalty: added to a pose's key each time it was expanded, to expand it again with other arcs [lengths of arcs];
                 0 expands each pose once.
+            good_enough: cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends the search.
         """
-        self.checker, self.radius = checker, radius
-        self.to_goal, self.goals = to_goal, goals
+        self.checker, self.edge_cost, self.radius = checker, edge_cost, radius
+        self.to_goal, self.length_to_goal, self.goals, self.good_enough = to_goal, length_to_goal, goals, good_enough
         self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
         self.arc, self.weight, self.visit_penalty, self.limit, self.max_expanded = arc, weight, visit_penalty, limit, max_expanded
@@ -100,7 +110,7 @@ class HybridAStar:
         self.open = Heap(0)
         self.last = -1
         self.size = self.expanded = 0
-        self.ended = False
+        self.ended = self.done = False
         self.reserve(1)
         self.add(Pose(start[0], start[1], start[2]), 0, -1, 0, 0, 0, True)
 
@@ -111,10 +121,10 @@ class HybridAStar:
         self.reserve((TURNS + 1) * expansions)
         with cython.nogil:
             for _ in range(expansions):
-                if self.open.count == 0 or self.last >= 0:
+                if self.open.count == 0 or self.done:
                     break
                 self.expand(self.open.pop())
-        self.ended = self.last >= 0 or self.open.count == 0 or self.expanded == self.max_expanded
+        self.ended = self.done or self.open.count == 0 or self.expanded == self.max_expanded
 
     def reserve(self, more: cython.int):
         """Make room for `more` poses, so that adding them allocates nothing."""
@@ -160,6 +170,10 @@ class HybridAStar:
 
     def expand(self, node):
         """Try the curve to the goal, then the three arcs from a pose, unless another pose of its cell was expanded."""
+        if self.last >= 0 and (self.keys[node] >= self.weight * self.limit
+                               or (self.good_enough > 0 and self.expanded % EXPANSIONS_FOR_BETTER == 0)):
+            self.done = True
+            return
         pose: Pose = self.pose_of(node)
         entry: cython.int = self.closed_set.entry_at(pose.x, pose.y, pose.theta)
         if not self.tried[node] and self.closed_set.costs[entry] == EXPANDED:
@@ -168,9 +182,10 @@ class HybridAStar:
         self.expanded += 1
         if self.visit_penalty > 0:
             self.visits_near.costs[self.visits_near.entry_at(pose.x, pose.y, 0)] += 1
-        if not self.tried[node] and self.curve_may_be_free[node] and self.reaches_goal(node):
-            self.last = node
-            return
+        if not self.tried[node] and self.curve_may_be_free[node]:
+            self.try_curve_to_goal(node)
+            if self.done:
+                return
         sine: cython.double = sin(pose.theta)
         cosine: cython.double = cos(pose.theta)
         self.extend(node, sine, cosine, 0)
@@ -181,19 +196,27 @@ class HybridAStar:
             self.keys[node] += self.retry_penalty * self.arc
             self.open.push(node, self.keys[node])
 
-    def reaches_goal(self, node):
-        """Return whether the shortest curve to a goal is free; if so, it is the last one of the path."""
+    def try_curve_to_goal(self, node):
+        """Try the shortest curve to a goal: if it is free and makes a cheaper path than before, it is the last one of that."""
         goal: cython.int
+        nearest: cython.int = -1
         pose: Pose = self.pose_of(node)
         curve: Curve
+        last_curve: Curve = Curve(0, 0, 0, 0)
         limit: cython.double = self.limit - self.costs[node]
-        self.last_goal = -1
         for goal in range(self.goals.shape[0]):
             curve = self.curve_to_goal(pose, goal, limit)
             if curve.first < UNLIMITED:
-                limit = edge_cost(curve)
-                self.last_goal, self.last_curve = goal, curve
-        return self.last_goal >= 0 and self.checker.motion_is_free(pose, self.radius, self.last_curve)
+                limit = length_of(curve)
+                nearest, last_curve = goal, curve
+        if nearest < 0 or not self.checker.motion_is_free(pose, self.radius, last_curve):
+            return
+        limit = self.limit - self.costs[node]
+        cost: cython.double = self.edge_cost.of(pose, self.radius, last_curve, limit)
+        if self.edge_cost.is_length or cost < limit:
+            self.limit = self.costs[node] + cost
+            self.last, self.last_goal, self.last_curve = node, nearest, last_curve
+            self.done = self.edge_cost.is_length or cost <= self.good_enough * self.to_goal.at(pose.x, pose.y)
 
     def extend(self, node, sine, cosine, turn):
         """Drive an arc from a pose, given the sine and cosine of its heading.
@@ -207,7 +230,7 @@ class HybridAStar:
         end = Pose(end.x, end.y, remainder(end.theta, TWO_PI))
         if not self.checker.pose_is_free(end):
             return
-        cost: cython.double = self.costs[node] + edge_cost(curve)
+        cost: cython.double = self.costs[node] + length_of(curve)
         entry: cython.int = self.closed_set.entry_at(end.x, end.y, end.theta)
         seen: cython.float = self.closed_set.costs[entry]
         if seen != UNSEEN and seen <= cost * (1 + 1e-6):
@@ -219,6 +242,10 @@ class HybridAStar:
             return
         if not self.checker.motion_is_free(pose, self.radius, curve):
             return
+        if not self.edge_cost.is_length:
+            cost = self.costs[node] + self.edge_cost.of(pose, self.radius, curve, self.limit - more - self.costs[node])
+            if cost + more >= self.limit or (seen != UNSEEN and seen <= cost * (1 + 1e-6)):
+                return
         self.closed_set.costs[entry] = cython.cast(cython.float, cost)
         key: cython.double = cost + self.weight * more
         if self.visit_penalty > 0:
@@ -236,8 +263,9 @@ class HybridAStar:
         around: cython.double = self.to_goal.at(pose.x, pose.y)
         if around >= limit or self.goals.shape[0] > 1:
             return around, True
-        direct: cython.double = edge_cost(self.curve_to_goal(pose, 0, limit))
-        return max(around, direct), direct >= LEAST_SHARE * around
+        direct: cython.double = length_of(self.curve_to_goal(pose, 0, limit))
+        length: cython.double = around if self.edge_cost.is_length else self.length_to_goal.at(pose.x, pose.y)
+        return max(around, direct), direct >= LEAST_SHARE * length
 
     def curve_to_goal(self, pose, goal, limit):
         """Return the shortest curve to a goal; its first arc is UNLIMITED where it is not shorter than `limit`."""

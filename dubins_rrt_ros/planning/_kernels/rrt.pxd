@@ -2,6 +2,7 @@ cimport cython
 from dubins_rrt_ros.planning._kernels.collision cimport CollisionChecker
 from dubins_rrt_ros.planning._kernels.cost_to_go cimport CostToGoKernel
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
+from dubins_rrt_ros.planning._kernels.edge_cost cimport EdgeCost
 from dubins_rrt_ros.planning._kernels.near cimport BackwardNeighbors, ForwardNeighbors
 from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 
@@ -9,6 +10,7 @@ from dubins_rrt_ros.planning._kernels.tree cimport SearchTree
 cdef class RrtKernel:
     cdef SearchTree tree
     cdef CollisionChecker checker
+    cdef EdgeCost edge_cost
     cdef double step
     cdef double max_edge
     cdef double near_factor
@@ -35,4 +37,4 @@ cdef class RrtKernel:
     cdef bint steer(self, Pose sample) noexcept nogil
     cdef int choose_parent(self, Pose pose, int node, double limit) noexcept nogil
     cdef void rewire(self, int node, double radius) noexcept nogil
-    cdef int add(self, Pose pose, int parent, Curve curve) noexcept nogil
+    cdef int add(self, Pose pose, int parent, Curve curve, double cost) noexcept nogil

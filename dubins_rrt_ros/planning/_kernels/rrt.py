@@ -23,7 +23,7 @@ if cython.compiled:
         length_of,
         shortest,
     )
-    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import edge_cost
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import EdgeCost
     from cython.cimports.dubins_rrt_ros.planning._kernels.near import BackwardNeighbors, ForwardNeighbors
     from cython.cimports.dubins_rrt_ros.planning._kernels.tree import SearchTree
     from cython.cimports.libc.math import ceil, fabs, log, remainder
@@ -33,7 +33,7 @@ else:
     from .collision import CollisionChecker
     from .cost_to_go import CostToGoKernel
     from .dubins import TWO_PI, UNLIMITED, Curve, Pose, end_of, first_part, length_of, shortest
-    from .edge_cost import edge_cost
+    from .edge_cost import EdgeCost
     from .near import BackwardNeighbors, ForwardNeighbors
     from .tree import SearchTree
 
@@ -54,18 +54,19 @@ class RrtKernel:
         goal_nodes: the nodes that reach the goal: its first `goal_count` entries.
     """
 
-    def __init__(self, tree: SearchTree, checker: CollisionChecker, step, near_factor, max_near, goal, tolerance_xy,
-                 tolerance_yaw):
+    def __init__(self, tree: SearchTree, checker: CollisionChecker, edge_cost: EdgeCost, step, near_factor, max_near, goal,
+                 tolerance_xy, tolerance_yaw):
         """Search with a tree, and without a cost bound at first.
 
         Args:
             checker: judges every edge.
+            edge_cost: the cost of edges, which is minimised.
             step: maximum length of a new edge [m]; 0 is unlimited.
             near_factor, max_near: near sets have near_factor * log(size) nodes, at most `max_near`.
             goal: (x, y, theta); tolerance_xy [m] and tolerance_yaw [rad] say what counts as reaching it.
         """
         self.tree = tree
-        self.checker, self.step, self.near_factor = checker, step, near_factor
+        self.checker, self.edge_cost, self.step, self.near_factor = checker, edge_cost, step, near_factor
         self.max_edge = step * (1 + ROUNDING) if step > 0 else UNLIMITED
         self.goal = Pose(goal[0], goal[1], goal[2])
         self.tolerance_xy, self.tolerance_yaw = tolerance_xy, tolerance_yaw
@@ -100,19 +101,21 @@ class RrtKernel:
         i: cython.int
         pose: Pose
         curve: Curve
+        cost: cython.double
         has_others: cython.bint = self.tree.size > 1  # nodes of the path itself gain nothing
         self.reserve(last)
         with cython.nogil:
             for i in range(1, last + 1):
                 pose = Pose(poses[i, 0], poses[i, 1], poses[i, 2])
                 curve = Curve(words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2])
+                cost = self.edge_cost.of(self.tree.pose_of(node), self.tree.radius, curve, UNLIMITED)
                 if i < last or end < 0:
-                    node = self.add(pose, node, curve)
+                    node = self.add(pose, node, curve, cost)
                     if has_others:
                         self.backward.collect_nearest(pose, self.near_count(), self.max_edge)
                         self.rewire(node, self.backward.neighbor_radius)
-                elif self.tree.costs[node] + edge_cost(curve) < self.tree.costs[end]:
-                    self.tree.reparent(end, node, curve)
+                elif self.tree.costs[node] + cost < self.tree.costs[end]:
+                    self.tree.reparent(end, node, curve, cost)
 
     def reserve(self, more: cython.int):
         """Make room for `more` nodes, so that adding them allocates nothing."""
@@ -154,8 +157,10 @@ class RrtKernel:
             return
         if not self.steer(sample) or length_of(self.steered) == 0:
             return
-        if self.checker.motion_is_free(self.tree.pose_of(self.closest.nodes[0]), self.tree.radius, self.steered):
-            self.add(self.new_pose, self.closest.nodes[0], self.steered)
+        begin: Pose = self.tree.pose_of(self.closest.nodes[0])
+        if self.checker.motion_is_free(begin, self.tree.radius, self.steered):
+            self.add(self.new_pose, self.closest.nodes[0], self.steered,
+                     self.edge_cost.of(begin, self.tree.radius, self.steered, UNLIMITED))
 
     def extend_and_rewire(self, pose):
         """Run one round of Algorithm 2: steer, choose the parent among the near nodes, add, rewire the near nodes through it."""
@@ -201,11 +206,11 @@ class RrtKernel:
         around: cython.double = self.to_goal.at(pose.x, pose.y)
         if around >= self.cost_bound or self.tolerance_xy > 0 or self.tolerance_yaw > 0:
             return around
-        return max(around, edge_cost(shortest(pose, self.goal, self.tree.radius)))
+        return max(around, length_of(shortest(pose, self.goal, self.tree.radius)))
 
     def cost_to_come(self, pose):
         """Return a lower bound of the cost from the start to a pose."""
-        direct: cython.double = edge_cost(shortest(self.tree.pose_of(0), pose, self.tree.radius))
+        direct: cython.double = length_of(shortest(self.tree.pose_of(0), pose, self.tree.radius))
         return max(self.from_start.at(pose.x, pose.y), direct)
 
     def steer(self, sample):
@@ -230,44 +235,63 @@ class RrtKernel:
 
         `node` is the pose's node, or -1 to add one. Return the node, or -1 where no edge will do.
         """
-        cheapest: cython.double
+        least: cython.double
+        bound: cython.double
         cost: cython.double
+        edge: cython.double = 0
         i: cython.int
-        best: cython.int
+        next_one: cython.int
         parent: cython.int
+        best: cython.int = -1
+        begin: Pose
         while True:
-            cheapest, best = limit, -1
+            least, next_one = limit, -1
             for i in range(self.backward.count):
-                if self.backward.keys[i] == UNLIMITED:  # its edge collides
+                if self.backward.keys[i] == UNLIMITED:  # its edge was looked at
                     continue
-                cost = self.tree.costs[self.backward.nodes[i]] + edge_cost(self.backward.curve_at(i))
-                if cost < cheapest:
-                    cheapest, best = cost, i
-            if best < 0:
-                return -1
-            parent = self.backward.nodes[best]
-            if self.checker.motion_is_free(self.tree.pose_of(parent), self.tree.radius, self.backward.curve_at(best)):
+                bound = self.tree.costs[self.backward.nodes[i]] + self.backward.keys[i]
+                if bound < least:
+                    least, next_one = bound, i
+            if next_one < 0:
                 break
-            self.backward.keys[best] = UNLIMITED
+            parent = self.backward.nodes[next_one]
+            begin = self.tree.pose_of(parent)
+            self.backward.keys[next_one] = UNLIMITED
+            if not self.checker.motion_is_free(begin, self.tree.radius, self.backward.curve_at(next_one)):
+                continue
+            cost = self.edge_cost.of(begin, self.tree.radius, self.backward.curve_at(next_one), limit - self.tree.costs[parent])
+            if self.edge_cost.is_length:  # which orders the edges by their costs
+                best, edge = next_one, cost
+                break
+            if cost < limit - self.tree.costs[parent]:
+                limit, best, edge = self.tree.costs[parent] + cost, next_one, cost
+        if best < 0:
+            return -1
         if node < 0:
-            return self.add(pose, parent, self.backward.curve_at(best))
-        self.tree.reparent(node, parent, self.backward.curve_at(best))
+            return self.add(pose, self.backward.nodes[best], self.backward.curve_at(best), edge)
+        self.tree.reparent(node, self.backward.nodes[best], self.backward.curve_at(best), edge)
         return node
 
     def rewire(self, node, radius):
         """Make `node` the parent of each near node that becomes cheaper by a free edge; its ancestors never do."""
         i: cython.int
         near: cython.int
+        cost: cython.double
+        budget: cython.double
+        pose: Pose = self.tree.pose_of(node)
         self.forward.collect_cheaper(node, radius, LEAST_GAIN)
         for i in range(self.forward.count):
             near = self.forward.nodes[i]
-            if (self.tree.costs[node] + edge_cost(self.forward.curve_at(i)) < self.tree.costs[near] - LEAST_GAIN
-                    and self.checker.motion_is_free(self.tree.pose_of(node), self.tree.radius, self.forward.curve_at(i))):
-                self.tree.reparent(near, node, self.forward.curve_at(i))
+            if (self.tree.costs[node] + self.forward.keys[i] < self.tree.costs[near] - LEAST_GAIN
+                    and self.checker.motion_is_free(pose, self.tree.radius, self.forward.curve_at(i))):
+                budget = self.tree.costs[near] - LEAST_GAIN - self.tree.costs[node]
+                cost = self.edge_cost.of(pose, self.tree.radius, self.forward.curve_at(i), budget)
+                if self.edge_cost.is_length or cost < budget:
+                    self.tree.reparent(near, node, self.forward.curve_at(i), cost)
 
-    def add(self, pose, parent, curve):
+    def add(self, pose, parent, curve, cost):
         """Add a node, to the goal nodes too if it reaches the goal."""
-        node: cython.int = self.tree.add(pose, parent, curve)
+        node: cython.int = self.tree.add(pose, parent, curve, cost)
         dx: cython.double = pose.x - self.goal.x
         dy: cython.double = pose.y - self.goal.y
         if (dx * dx + dy * dy <= self.tolerance_xy * self.tolerance_xy

@@ -1,10 +1,13 @@
 cimport cython
 from dubins_rrt_ros.planning._kernels.collision cimport CollisionChecker
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
+from dubins_rrt_ros.planning._kernels.edge_cost cimport EdgeCost
 
 @cython.final
 cdef class Shortcutter:
     cdef CollisionChecker checker
+    cdef EdgeCost edge_cost
+    cdef double price
     cdef double radius
     cdef double scale
     cdef readonly int count
@@ -12,6 +15,8 @@ cdef class Shortcutter:
     cdef readonly signed char[::1] words
     cdef readonly double[:, ::1] lengths
     cdef readonly double[::1] ends
+    cdef double[::1] costs
+    cdef double[::1] excess
     # A change under way: `new` poses behind the pose `left`, the first `kept` of which lie on the path; it leads from `begin` `at`.
     cdef int left
     cdef int kept
@@ -21,6 +26,8 @@ cdef class Shortcutter:
     cdef double[:, ::1] new_poses
     cdef signed char[::1] new_words
     cdef double[:, ::1] new_lengths
+    cdef double[::1] new_costs
+    cdef double rest_cost
     cdef void try_change(self, bint direct, double where, double back, double ahead, double across, double turn) noexcept nogil
     cdef void try_shortcut(self, double begin, double end) noexcept nogil
     cdef void try_perturbation(self, double begin, double middle, double end, double fine, double across,
@@ -33,6 +40,9 @@ cdef class Shortcutter:
     cdef Curve curve_to(self, int pose) noexcept nogil
     cdef Pose pose_of(self, int pose) noexcept nogil
     cdef bint new_is_free(self) noexcept nogil
+    cdef double excess_between(self, double begin, double end) noexcept nogil
+    cdef bint pays(self, double s, double least_gain) noexcept nogil
+    cdef Curve rest_of(self, int edge, double s) noexcept nogil
     cdef bint is_free(self, Pose pose, Curve curve) noexcept nogil
     cdef void come_back(self, double s) noexcept nogil
     cdef void put_in(self, int tail) noexcept nogil

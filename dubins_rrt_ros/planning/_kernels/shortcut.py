@@ -3,7 +3,8 @@
 
 A shortcut replaces a piece of the path by the Dubins curve between its ends. A vertex perturbation replaces it by two curves over
 a pose near the middle of the piece, so that the poses between curves find their best places and headings by trial. A change is
-made only where it is free and shorter than the piece that it replaces. Non-holonomic shortcuts are due to S. Sekhavat et al.
+made only where it is free and costs less than the piece that it replaces; where the cost is not the length, that rules most of
+them out. A price for each curve makes a path simpler at little cost. Non-holonomic shortcuts are due to S. Sekhavat et al.
 (1998); OMPL's PathSimplifier has both.
 """
 
@@ -25,15 +26,19 @@ if cython.compiled:
         shortest_below,
         turn_of,
     )
+    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import EdgeCost
     from cython.cimports.libc.math import cos, exp, log, remainder, sin
 else:
     from math import cos, exp, log, remainder, sin
 
     from .collision import CollisionChecker
     from .dubins import TWO_PI, UNLIMITED, Curve, Pose, along, drive, length_of, part_of, rounding_at, shortest_below, turn_of
+    from .edge_cost import EdgeCost
 
 #: Least gain for which the path is changed [m]; a smaller one is rounding.
 LEAST_GAIN = cython.declare(cython.double, 1e-9)
+#: The same where the cost is not the length, as a share of the cost of what is replaced; less is an error of the integrals.
+LEAST_SHARE = cython.declare(cython.double, 1e-4)
 #: Length of the shortest piece of a path that is replaced, in turning radii.
 LEAST_SPAN = cython.declare(cython.double, 0.25)
 #: Natural logarithm of the ratio of the coarsest to the finest perturbations.
@@ -54,27 +59,37 @@ class Shortcutter:
         count: number of poses; the first `count` entries of the arrays are in use.
         poses: (n, 3): x [m], y [m], theta [rad].
         words, lengths: (n,) and (n, 3): the curves to the poses, in metres; those of the first mean nothing.
-        ends: (n,): the arc length of the path up to each pose [m].
+        ends, excess: (n,): the arc length of the path up to each pose, and what its cost is above that [m].
+        costs: (n,): the costs of the curves to the poses [m]; these and `excess` mean nothing where the cost is the length.
     """
 
-    def __init__(self, checker: CollisionChecker, radius: cython.double, scale: cython.double, poses, words, lengths, tries):
+    def __init__(self, checker: CollisionChecker, edge_cost: EdgeCost, radius: cython.double, scale: cython.double, poses, words,
+                 lengths, tries, price: cython.double = 0):
         """Copy a path.
 
         Args:
             checker: judges every new curve; the path is free by it.
+            edge_cost: the cost of curves.
             radius: the turning radius [m].
             scale: length that the sizes of changes are measured in [m]: the turning radius, or more where that is tiny.
             poses, words, lengths: of the path, as in the attributes.
             tries: number of changes that will be tried, for which room is made.
+            price: added to the cost of each curve [m], where the cost is not the length.
         """
-        self.checker, self.radius, self.scale = checker, radius, scale
+        self.checker, self.edge_cost, self.radius, self.scale, self.price = checker, edge_cost, radius, scale, price
         self.count = len(poses)
         # A change adds two poses at most; between two clearings they are all kept.
         room = self.count + 2 * tries + MAX_NEW
         all_poses, all_words, all_lengths = np.empty((room, 3)), np.empty(room, np.int8), np.empty((room, 3))
         all_poses[:self.count], all_words[:self.count], all_lengths[:self.count] = poses, words, lengths
         self.poses, self.words, self.lengths = all_poses, all_words, all_lengths
-        self.ends = np.zeros(room)
+        self.ends, self.excess, costs = np.zeros((3, room))
+        self.new_costs = np.zeros(MAX_NEW)
+        self.rest_cost = 0
+        if not edge_cost.is_length:
+            edge_cost.costs(all_poses[:self.count - 1], radius, all_words[1:self.count], all_lengths[1:self.count],
+                            costs[1:self.count])
+        self.costs = costs
         self.new_poses, self.new_lengths = np.empty((2, MAX_NEW, 3))
         self.new_words = np.empty(MAX_NEW, np.int8)
         self.measure_from(1)
@@ -119,7 +134,8 @@ class Shortcutter:
         """Replace the path between two arc lengths by one curve, if that is shorter and free."""
         target: Pose = self.pose_at(end)
         self.leave(begin)
-        if self.drive_to(target, end - begin - LEAST_GAIN) and self.new_is_free():
+        if (self.drive_to(target, end - begin - LEAST_GAIN + self.excess_between(begin, end)) and self.new_is_free()
+                and self.pays(end, LEAST_SHARE)):
             self.come_back(end)
 
     def try_perturbation(self, begin, middle, end, fine, across, turn):
@@ -128,14 +144,14 @@ class Shortcutter:
         via: Pose = self.pose_at(middle)
         across *= size * min(end - begin, 2 * self.scale)
         via = Pose(via.x - across * sin(via.theta), via.y + across * cos(via.theta), remainder(via.theta + turn * size, TWO_PI))
-        limit: cython.double = end - begin - LEAST_GAIN
+        limit: cython.double = end - begin - LEAST_GAIN + self.excess_between(begin, end)
         if not self.checker.pose_is_free(via):
             return
         self.leave(begin)
         if not self.drive_to(via, limit):
             return
         limit -= length_of(self.new_curve(self.new - 1))
-        if self.drive_to(self.pose_at(end), limit) and self.new_is_free():
+        if self.drive_to(self.pose_at(end), limit) and self.new_is_free() and self.pays(end, LEAST_SHARE):
             self.come_back(end)
 
     def leave(self, s):
@@ -198,13 +214,52 @@ class Shortcutter:
         middle = drive(middle, self.radius, turn_of(curve.word, 1), curve.second / 2)
         return self.checker.pose_is_free(middle) and self.checker.motion_is_free(pose, self.radius, curve)
 
+    def excess_between(self, begin, end):
+        """Return what the curves that hold two arc lengths, and all between them, cost above their lengths; with their prices."""
+        if self.edge_cost.is_length:
+            return 0
+        first: cython.int = self.edge_at(begin)
+        last: cython.int = self.edge_at(end)
+        return self.excess[last] - self.excess[first - 1] + self.price * (last - first)
+
+    def pays(self, s, least_gain):
+        """Return whether the change, which comes back to the path at arc length `s`, saves a share `least_gain` of its cost.
+
+        It does where the cost is the length, which was compared before. The costs of its curves are noted.
+        """
+        if self.edge_cost.is_length:
+            return True
+        edge: cython.int = self.edge_at(s)
+        rest: Curve = self.rest_of(edge, s)
+        i: cython.int
+        left: cython.double = 0
+        for i in range(self.left, edge + 1):
+            left += self.costs[i]
+        left = left * (1 - least_gain) + self.price * (edge + 1 - self.left - self.new - (1 if length_of(rest) > 0 else 0))
+        pose: Pose = self.pose_of(self.left - 1)
+        for i in range(self.new):
+            self.new_costs[i] = self.edge_cost.of(pose, self.radius, self.new_curve(i), left)
+            left -= self.new_costs[i]
+            if left <= 0:
+                return False
+            pose = Pose(self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2])
+        self.rest_cost = self.edge_cost.of(pose, self.radius, rest, left)
+        return self.rest_cost < left
+
+    def rest_of(self, edge, s):
+        """Return what is left of the curve to a pose from arc length `s` of the path on."""
+        if s >= self.ends[edge]:
+            return Curve(0, 0, 0, 0)
+        return part_of(self.curve_to(edge), s - self.ends[edge - 1], self.ends[edge] - self.ends[edge - 1])
+
     def come_back(self, s):
         """Replace the path, from where the change left it to arc length `s`, by the change."""
         edge: cython.int = self.edge_at(s)
         rest: Curve
         if s < self.ends[edge]:
-            rest = part_of(self.curve_to(edge), s - self.ends[edge - 1], self.ends[edge] - self.ends[edge - 1])
+            rest = self.rest_of(edge, s)
             self.lengths[edge, 0], self.lengths[edge, 1], self.lengths[edge, 2] = rest.first, rest.second, rest.third
+            self.costs[edge] = self.rest_cost
         else:
             edge += 1
         self.put_in(edge)
@@ -216,18 +271,22 @@ class Shortcutter:
         part: cython.int
         for i in range(self.new):
             self.words[self.left + i] = self.new_words[i]
+            self.costs[self.left + i] = self.new_costs[i]
             for part in range(3):
                 self.poses[self.left + i, part] = self.new_poses[i, part]
                 self.lengths[self.left + i, part] = self.new_lengths[i, part]
         self.measure_from(self.left)
 
     def clear(self):
-        """Remove the poses whose neighbours are joined by a free curve that is no longer than the path over them."""
+        """Remove the poses whose neighbours are joined by a free curve that costs no more than the path over them."""
         pose: cython.int = 1
+        limit: cython.double
         while pose < self.count - 1:
             self.leave_pose(pose - 1, self.pose_of(pose - 1))
-            if (self.drive_to(self.pose_of(pose + 1), self.ends[pose + 1] - self.ends[pose - 1] + LEAST_GAIN)
-                    and self.new_is_free()):
+            limit = self.ends[pose + 1] - self.ends[pose - 1] + LEAST_GAIN
+            limit += self.excess_between(self.ends[pose], self.ends[pose + 1])
+            if (self.drive_to(self.pose_of(pose + 1), limit) and self.new_is_free()
+                    and self.pays(self.ends[pose + 1], -LEAST_SHARE)):
                 self.put_in(pose + 2)
             else:
                 pose += 1
@@ -247,15 +306,17 @@ class Shortcutter:
         """Write a pose and the curve to it over another."""
         part: cython.int
         self.words[to] = self.words[pose]
+        self.costs[to] = self.costs[pose]
         for part in range(3):
             self.poses[to, part] = self.poses[pose, part]
             self.lengths[to, part] = self.lengths[pose, part]
 
     def measure_from(self, first):
-        """Recompute `ends` from the pose `first` on."""
+        """Recompute `ends` and `excess` from the pose `first` on."""
         i: cython.int
         for i in range(first, self.count):
             self.ends[i] = self.ends[i - 1] + length_of(self.curve_to(i))
+            self.excess[i] = self.excess[i - 1] + self.costs[i] - length_of(self.curve_to(i))
 
     def edge_at(self, s):
         """Return the pose whose curve holds the arc length `s` of the path, the first of two."""

@@ -11,7 +11,7 @@ cdef class SearchTree:
     cdef double[:, ::1] headings
     cdef readonly int[::1] parents
     cdef readonly double[::1] costs
-    cdef double[::1] edge_costs
+    cdef readonly double[::1] edge_costs
     cdef readonly signed char[::1] words
     cdef readonly double[:, ::1] lengths
     cdef int[::1] first_child
@@ -25,9 +25,9 @@ cdef class SearchTree:
     cdef double x_extent
     cdef double y_extent
     cdef Pose pose_of(self, int node) noexcept nogil
-    cdef int add(self, Pose pose, int parent, Curve curve) noexcept nogil
-    cdef void reparent(self, int node, int parent, Curve curve) noexcept nogil
-    cdef void attach(self, int node, int parent, Curve curve) noexcept nogil
+    cdef int add(self, Pose pose, int parent, Curve curve, double cost) noexcept nogil
+    cdef void reparent(self, int node, int parent, Curve curve, double cost) noexcept nogil
+    cdef void attach(self, int node, int parent, Curve curve, double cost) noexcept nogil
     cdef void update_costs_below(self, int root) noexcept nogil
     cdef void index(self, int node) noexcept nogil
     cdef int bucket_row(self, double y) noexcept nogil

@@ -8,13 +8,11 @@ from .arrays import resized
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import Curve, Pose, rounding_at
-    from cython.cimports.dubins_rrt_ros.planning._kernels.edge_cost import edge_cost
     from cython.cimports.libc.math import cos, sin, sqrt
 else:
     from math import cos, sin, sqrt
 
     from .dubins import Curve, Pose, rounding_at
-    from .edge_cost import edge_cost
 
 #: Approximate number of buckets at first; not a function of the budget, since the order of nodes in buckets is that of rewiring.
 BUCKETS = 1024
@@ -34,7 +32,7 @@ class SearchTree:
         poses: (n, 3): x [m], y [m], theta [rad].
         headings: (n, 2): sine and cosine of theta.
         parents: (n,), the root's is -1.
-        costs: (n,): the cost of the path from the root [m].
+        costs, edge_costs: (n,): the costs of the path from the root, and of the edge from the parent [m].
         words, lengths: (n,) and (n, 3): the edges from the parents; lengths in metres.
     """
 
@@ -58,7 +56,7 @@ class SearchTree:
         self.words = np.empty(0, np.int8)
         self.lengths = np.empty((0, 3))
         self.reserve(64)
-        self.add(Pose(root[0], root[1], root[2]), -1, Curve(0, 0, 0, 0))
+        self.add(Pose(root[0], root[1], root[2]), -1, Curve(0, 0, 0, 0), 0)
 
     def reserve(self, more: cython.int):
         """Make room for `more` nodes, so that adding them allocates nothing."""
@@ -90,12 +88,12 @@ class SearchTree:
         """Return the pose of a node."""
         return Pose(self.poses[node, 0], self.poses[node, 1], self.poses[node, 2])
 
-    def attach(self, node, parent, curve):
-        """Make `node`, which has no parent, a child of `parent`."""
+    def attach(self, node, parent, curve, cost):
+        """Make `node`, which has no parent, a child of `parent` by a curve of this cost."""
         self.parents[node] = parent
         self.words[node] = curve.word
         self.lengths[node, 0], self.lengths[node, 1], self.lengths[node, 2] = curve.first, curve.second, curve.third
-        self.edge_costs[node] = edge_cost(curve)
+        self.edge_costs[node] = cost
         self.costs[node] = self.costs[parent] + self.edge_costs[node]
         sibling: cython.int = self.first_child[parent]
         self.first_child[parent] = node
@@ -104,8 +102,8 @@ class SearchTree:
         if sibling >= 0:
             self.previous_sibling[sibling] = node
 
-    def add(self, pose, parent, curve):
-        """Add a node and return it; room must have been reserved. The root is added with the parent -1."""
+    def add(self, pose, parent, curve, cost):
+        """Add a node at the end of a curve and return it; room must have been reserved. The root is added with the parent -1."""
         node: cython.int = self.size
         self.size += 1
         self.poses[node, 0], self.poses[node, 1], self.poses[node, 2] = pose.x, pose.y, pose.theta
@@ -117,7 +115,7 @@ class SearchTree:
             self.costs[node] = self.edge_costs[node] = self.words[node] = 0
             self.lengths[node, 0] = self.lengths[node, 1] = self.lengths[node, 2] = 0
         else:
-            self.attach(node, parent, curve)
+            self.attach(node, parent, curve, cost)
         self.index(node)
         return node
 
@@ -160,7 +158,7 @@ class SearchTree:
         shape = (int(self.y_extent / self.bucket_size) + 1, int(self.x_extent / self.bucket_size) + 1)
         self.buckets = np.full(shape, -1, dtype=np.int32)
 
-    def reparent(self, node, parent, curve):
+    def reparent(self, node, parent, curve, cost):
         """Move `node` with all its descendants below `parent`, which must be none of them; their costs follow."""
         before: cython.int = self.previous_sibling[node]
         after: cython.int = self.next_sibling[node]
@@ -170,7 +168,7 @@ class SearchTree:
             self.first_child[self.parents[node]] = after
         if after >= 0:
             self.previous_sibling[after] = before
-        self.attach(node, parent, curve)
+        self.attach(node, parent, curve, cost)
         self.update_costs_below(node)
 
     def update_costs_below(self, root):

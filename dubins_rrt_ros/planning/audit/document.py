@@ -9,8 +9,9 @@ import numpy as np
 from ..option import is_number
 from ..problem import InvalidPose, checked_waypoint
 from ..text import quoted
+from .cost import COST_ERROR
 from .sweep import PRECISION, SHARE, Arcs
-from .verdict import TOLERANCE, Audit, driven_arcs, in_order, passing_findings
+from .verdict import TOLERANCE, Audit, driven_arcs, passing_findings
 
 if TYPE_CHECKING:
     from ..curves.path import Path
@@ -27,7 +28,8 @@ _SETTINGS = ("planner", "seed")
 _AHEAD = 8
 
 
-def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, map_id: str) -> Iterator[str]:
+def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, map_id: str, cost: float | None = None
+                      ) -> Iterator[str]:
     """Yield a sentence for each field that does not agree with the path.
 
     Args:
@@ -35,6 +37,7 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
         path: the path of its curves.
         found: what the audit found of that path, with the vehicle and on the map of the document.
         map_id: the id of the map; "" where another one may be taken.
+        cost: the cost of the path by the document's settings [m]; None where that is not judged.
     """
     for name, expected in _SAID_OF_A_PATH.items():
         if name in document and document[name] != expected:
@@ -50,18 +53,25 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
     yield from _figure(document, "length", length, _ROUNDING * length)
     yield from _figure(document, "max_curvature", found.max_curvature, _ROUNDING * found.max_curvature)
     yield from _figure(document, "min_clearance", found.min_clearance, max(PRECISION, SHARE * found.min_clearance))
-    yield from _bound_findings(document, length)
+    yield from _bound_findings(document, length, "lower_bound", "gap", f"the path is {length:.6g} m long", _ROUNDING)
+    if cost is not None:
+        tolerance = _ROUNDING if cost == length else COST_ERROR
+        yield from _figure(document, "cost", cost, tolerance * cost)
+        yield from _bound_findings(document, document.get("cost", cost), "cost_lower_bound", "cost_gap",
+                                   f"the cost is {cost:.6g} m", tolerance)
 
 
 def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()) -> list[str]:
     """Return the fields of a plan's document that are not judged.
 
-    Of the lower bound it is judged that the path is not shorter, but not that there is no shorter one.
+    Of the lower bounds it is judged that the path is not below them, but not that no other one is.
     """
-    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "max_curvature", "min_clearance", "gap", "poses",
-              "waypoints", "waypoint_indices"}
+    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "max_curvature", "min_clearance", "gap", "cost",
+              "cost_gap", "poses", "waypoints", "waypoint_indices"}
     others = [name for name in document if name not in judged or name in passed_over]
-    return ["lower_bound (that no path is shorter)" if name == "lower_bound" else name for name in others]
+    said = {"lower_bound": "lower_bound (that no path is shorter)",
+            "cost_lower_bound": "cost_lower_bound (that no path costs less)"}
+    return [said.get(name, name) for name in others]
 
 
 def pose_findings(poses: np.ndarray, path: "Path", spacing: float) -> list[str]:
@@ -72,7 +82,7 @@ def pose_findings(poses: np.ndarray, path: "Path", spacing: float) -> list[str]:
         path: the path; its curves can be driven.
         spacing: maximum distance between two poses along the path [m]; 0 is any.
     """
-    arcs = in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
+    arcs = _in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
     begins = np.append(0.0, np.cumsum(arcs.length))
     places, off = _places(poses, arcs, begins, TOLERANCE + 8 * np.finfo(float).eps * float(np.abs(poses[:, :2]).max()))
     if off:
@@ -102,15 +112,19 @@ def _waypoint_findings(document: Mapping[str, Any], path: "Path") -> Iterator[st
         yield f"waypoint_indices are {quoted(indices)}, which are not the poses at the waypoints"
 
 
-def _bound_findings(document: Mapping[str, Any], length: float) -> Iterator[str]:
-    bound = document.get("lower_bound", 0.0)
-    if not (is_number(bound) and 0 <= bound <= length * (1 + _ROUNDING)):
-        yield f"lower_bound is {quoted(bound)}, and the path is {length:.6g} m long"
-    elif "gap" in document:
-        gap = length / bound - 1 if bound > 0 else 0.0 if length == 0 else None
-        said = document["gap"]
+def _bound_findings(document: Mapping[str, Any], value: Any, bound_name: str, gap_name: str, what: str, tolerance: float
+                    ) -> Iterator[str]:
+    bound = document.get(bound_name, 0.0)
+    if not is_number(value):
+        return
+    if not (is_number(bound) and 0 <= bound <= value * (1 + tolerance)):
+        yield f"{bound_name} is {quoted(bound)}, and {what}"
+    elif gap_name in document:
+        gap = value / bound - 1 if bound > 0 else 0.0 if value == 0 else None
+        said = document[gap_name]
         if not (said is gap or (gap is not None and is_number(said) and abs(said - gap) <= _ROUNDING * (1 + gap))):
-            yield f"gap is {quoted(said)}, and by length and lower_bound it is {gap if gap is None else f'{gap:.6g}'}"
+            of = "length" if gap_name == "gap" else "cost"
+            yield f"{gap_name} is {quoted(said)}, and by {of} and {bound_name} it is {gap if gap is None else f'{gap:.6g}'}"
 
 
 def _gap_findings(places: np.ndarray, begins: np.ndarray, curvature: np.ndarray, spacing: float) -> Iterator[str]:
@@ -126,6 +140,12 @@ def _gap_findings(places: np.ndarray, begins: np.ndarray, curvature: np.ndarray,
     left_out = np.flatnonzero(nearest > 2 * TOLERANCE)
     if len(left_out):
         yield f"no pose is where the curvature changes, {begins[bends][left_out[0]]:.6g} m along the path"
+
+
+def _in_order(arcs: Arcs, curves: int) -> Arcs:
+    """Return the arcs of curves as they are driven; they come as all first ones, all second ones and all third ones."""
+    order = np.arange(len(arcs.x)).reshape(-1, max(curves, 1)).T.ravel()
+    return Arcs(arcs.x[order], arcs.y[order], arcs.theta[order], arcs.curvature[order], arcs.length[order])
 
 
 def _places(poses: np.ndarray, arcs: Arcs, begins: np.ndarray, tolerance: float

@@ -8,6 +8,7 @@ occupied cells, or to polygons, in double precision; nothing is rounded to cells
 
 import copy
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,15 +18,21 @@ from scipy import ndimage
 from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.collision import CollisionChecker, PolygonChecker
-from .._kernels.cost_to_go import free_squares
+from .._kernels.cost_to_go import free_squares, greatest_clearances
+from .._kernels.eikonal import node_slowness
+from .._kernels.room import CornerIndex, FootprintRoom, Room
 from ..curves.dubins import DubinsCurve
 from ..maps.frame import Frame
 from ..maps.model import GridMap, Map
 from ..problem import Pose
 from ..vehicle import Vehicle
 from .footprint import cover
-from .raster import CLEARANCE_MARGIN, grid_clearance, polygon_clearance
+from .raster import CLEARANCE_MARGIN, grid_clearance, grid_corners, polygon_clearance
 
+#: Side of the buckets of obstacles' corners, in cells of the raster.
+BUCKET = 8
+#: Number of parts along the side of a free square for which its greatest clearance is bounded, and estimated.
+BOUND_PARTS, ESTIMATE_PARTS = 2, 1
 #: Maximum side of a free square as a share of the required clearance, so that walls do not vanish between squares ...
 SQUARE_SHARE = 0.6
 #: ... and approximate maximum number of squares, for which they are made larger.
@@ -74,6 +81,7 @@ class ClearanceField:
     def _forget(self) -> None:
         self._components: tuple[float, np.ndarray] | None = None
         self._free_squares: tuple[float, FreeSquares] | None = None
+        self._slowness: dict[bool, tuple[tuple[float, float, float], tuple[np.ndarray, np.ndarray]]] = {}
 
     def shared(self) -> "ClearanceField":
         """Return the same distances for another vehicle, whose components and free squares are kept apart from these."""
@@ -98,6 +106,20 @@ class ClearanceField:
         return PolygonChecker(clearance=self.kernel, required_clearance=vehicle.required_clearance, discs=found.discs,
                               corners=found.corners, first_corner=found.first_corner,
                               worth=max(found.excess, 2 * CLEARANCE_MARGIN))
+
+    def room(self, vehicle: Vehicle) -> Room:
+        """Return the room of a vehicle, the distance from its outline to the nearest obstacle, for one thread."""
+        if not vehicle.footprint:
+            return Room(self.kernel, vehicle.robot_radius)
+        return FootprintRoom(self.kernel, cover(vehicle.footprint).discs, np.array(vehicle.footprint), self._corners)
+
+    @cached_property
+    def _corners(self) -> CornerIndex:
+        if isinstance(self.kernel, GridClearance):
+            points = grid_corners(np.asarray(self.kernel.row_gap) == 0, self.kernel.resolution)
+        else:
+            points = self.frame.from_map(shapely.get_coordinates(self._polygons))
+        return CornerIndex(points, self.kernel.width, self.kernel.height, BUCKET * self.kernel.resolution)
 
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
         """Return whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
@@ -160,6 +182,28 @@ class ClearanceField:
             return FreeSquares(cells, np.pad(np.ones((rows, columns), np.int8), (1, 2)))  # a border as free_squares makes
         cells = _cells_of_square(shape, SQUARE_SHARE * required_clearance / self.kernel.resolution)
         return FreeSquares(cells, free_squares(self.kernel, cells, required_clearance))
+
+    def slowness(self, required_clearance: float, preferred_clearance: float, weight: float, is_bound: bool
+                 ) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a metre costs in each of the `free_squares`, and at least at each of their nodes.
+
+        They are kept for the last values.
+
+        Args:
+            required_clearance: radius of the largest disc around the reference point in the vehicle [m].
+            preferred_clearance, weight: of the cost, as `_kernels/edge_cost.py` says [m].
+            is_bound: True for lower bounds in a square, False for estimates.
+        """
+        key = required_clearance, preferred_clearance, weight
+        kept = self._slowness.get(is_bound)
+        if kept is None or kept[0] != key:
+            cells, squares = self.free_squares(required_clearance)
+            clearances = greatest_clearances(self.kernel, cells, squares, required_clearance + preferred_clearance,
+                                             *((BOUND_PARTS, 0.5) if is_bound else (ESTIMATE_PARTS, 0.0)))
+            room = np.maximum(clearances - required_clearance, 0)
+            of_squares = 1 + weight * np.maximum(0, 1 - room / preferred_clearance)**2
+            self._slowness[is_bound] = kept = key, (of_squares, node_slowness(squares, of_squares))
+        return kept[1]
 
     def _may_be_free(self, bounds: np.ndarray, required_clearance: float) -> np.ndarray:
         if required_clearance < 0:

@@ -113,6 +113,18 @@ def _by_scipy(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(row_gap, np.int32), _bound_of_squared(math.isqrt(squared.max()) + 1, cell)[squared]
 
 
+def grid_corners(blocked: np.ndarray, cell: float) -> np.ndarray:
+    """Return (n, 2) float64: x and y of the corners of blocked cells that stick out, from the grid's corner on [m].
+
+    Those are the nodes between cells around which a blocked one has no blocked neighbour beside it.
+    """
+    padded = np.pad(blocked, 1, constant_values=True)
+    low, high = padded[:-1], padded[1:]
+    a, b, c, d = low[:, :-1], low[:, 1:], high[:, :-1], high[:, 1:]
+    sticks_out = ((a | d) & ~b & ~c) | ((b | c) & ~a & ~d)
+    return np.argwhere(sticks_out)[:, ::-1] * cell
+
+
 def polygon_clearance(polygons: PolygonMap) -> PolygonClearance:
     """Return the distances to the edges of polygons; as for a grid, with the cells that an edge touches as obstacles."""
     x0, y0, x1, y1 = shapely.bounds(polygons.free).tolist()

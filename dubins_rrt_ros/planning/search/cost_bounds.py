@@ -7,6 +7,7 @@ import numpy as np
 from ..collision.clearance import ClearanceField
 from ..problem import Problem
 from .background import BACKGROUND, BackgroundJob
+from .cost import Objective
 from .cost_to_go import CostToGo
 
 #: Minimum relative fall of the best cost for which nodes are pruned again.
@@ -19,13 +20,16 @@ class CostBounds:
     Attributes:
         to_goal: the cost to the goal, a lower bound once `make_to_goal` has been called.
         from_start: the cost from the start, a lower bound; None until `make_from_start` has been called.
+        length_to_goal: the length to the goal, a lower bound once `make_length_to_goal` has been called.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, to_goal: CostToGo):
-        self.to_goal = to_goal
+    def __init__(self, problem: Problem, field: ClearanceField, to_goal: CostToGo, length_to_goal: CostToGo,
+                 objective: Objective):
+        self.to_goal, self.length_to_goal, self._objective = to_goal, length_to_goal, objective
         self.from_start: CostToGo | None = None
         self._problem, self._field = problem, field
         self._jobs: tuple[BackgroundJob[None], BackgroundJob[CostToGo] | None] | None = None
+        self._length_job: BackgroundJob[None] | None = None
         self._pruned_at = math.inf
 
     def start(self, from_start: bool = False) -> None:
@@ -33,13 +37,15 @@ class CostBounds:
         if self._jobs is None:
             self._jobs = (BACKGROUND.start(self.to_goal.prepare_bound),
                           BACKGROUND.start(self._computed_from_start) if from_start else None)
+            if self.length_to_goal is not self.to_goal:
+                self._length_job = BACKGROUND.start(self.length_to_goal.prepare_bound)
 
     def _computed_from_start(self) -> CostToGo:
-        return CostToGo.from_start(self._problem, self._field).make_bound()
+        return CostToGo.from_start(self._problem, self._field, self._objective).make_bound()
 
     def wait(self, seconds: float) -> bool:
         """Wait for so long; return True if the bounds that were started are there, or are left to who asks for them."""
-        return self._jobs is None or all(job is None or job.wait(seconds) for job in self._jobs)
+        return self._jobs is None or all(job is None or job.wait(seconds) for job in (*self._jobs, self._length_job))
 
     def make_to_goal(self) -> CostToGo:
         """Make the cost to the goal a lower bound; nothing else may use it meanwhile."""
@@ -47,6 +53,12 @@ class CostBounds:
         if self._jobs:
             self._jobs[0]()
         return self.to_goal.make_bound()
+
+    def make_length_to_goal(self) -> CostToGo:
+        """Make the length to the goal a lower bound; nothing else may use it meanwhile."""
+        if self._length_job:
+            self._length_job()
+        return self.length_to_goal.make_bound()
 
     def make_from_start(self) -> CostToGo:
         """Make the bound from the start, or wait for it."""

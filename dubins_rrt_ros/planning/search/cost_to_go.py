@@ -1,4 +1,4 @@
-"""The cost-to-go: the shortest ways around obstacles to the goal, or from the start; no path of the vehicle is shorter."""
+"""The cost-to-go: the cheapest ways around obstacles to the goal, or from the start; no path of the vehicle costs less."""
 
 import math
 
@@ -8,22 +8,23 @@ from .._kernels import UNLIMITED
 from .._kernels.cost_to_go import CostToGoKernel
 from ..collision.clearance import ClearanceField
 from ..problem import Problem
+from .cost import Objective
 
 
 class CostToGo:
-    """Lengths of the shortest ways around obstacles to a source, for the vehicle's disc, as if it could turn on the spot.
+    """Costs of the cheapest ways around obstacles to a source, for the vehicle's disc, as if it could turn on the spot.
 
     After `make_bound` they are lower bounds, as `_kernels/cost_to_go.py` proves; before, they can be too high by a few percent.
 
-    They are about one percent below the shortest ways, and a little more where ways bend, since a square is taken as free where a
-    point of it may be. On maps so large that a square is wider than the vehicle, thin walls may have holes.
+    Lengths are about one percent below the shortest ways, and a little more where ways bend, since a square is taken as free
+    where a point of it may be. On maps so large that a square is wider than the vehicle, thin walls may have holes.
 
     Attributes:
         kernel: the compiled field, for the inner loops of the searches.
     """
 
     def __init__(self, field: ClearanceField, required_clearance: float, source: tuple[float, float], tolerance: float = 0.0,
-                 target: tuple[float, float] | None = None):
+                 target: tuple[float, float] | None = None, objective: Objective | None = None):
         """Prepare the costs, which are computed as far as they are asked for until `make_bound`.
 
         Args:
@@ -31,21 +32,23 @@ class CostToGo:
             required_clearance: minimum clearance of a way [m].
             source, tolerance: the ways end within `tolerance` [m] of `source`.
             target: the costs on the way to here are computed first.
+            objective: what a metre costs; None makes the costs lengths.
         """
         cells, squares = field.free_squares(required_clearance)
-        self._field, self._free = field, squares
+        self._field, self._free, self._objective = field, squares, objective
         self.kernel = CostToGoKernel(clearance=field.kernel, block=cells, free=squares, source=source, tolerance=tolerance,
-                                     target=target)
+                                     target=target, slowness=objective.slowness(is_bound=False) if objective else None)
 
     @classmethod
-    def to_goal(cls, problem: Problem, field: ClearanceField) -> "CostToGo":
+    def to_goal(cls, problem: Problem, field: ClearanceField, objective: Objective | None = None) -> "CostToGo":
         """Return the costs to where the goal is reached."""
-        return cls(field, problem.vehicle.required_clearance, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2])
+        return cls(field, problem.vehicle.required_clearance, problem.goal[:2], problem.goal_tolerance_xy, problem.start[:2],
+                   objective)
 
     @classmethod
-    def from_start(cls, problem: Problem, field: ClearanceField) -> "CostToGo":
+    def from_start(cls, problem: Problem, field: ClearanceField, objective: Objective | None = None) -> "CostToGo":
         """Return the costs from the start."""
-        return cls(field, problem.vehicle.required_clearance, problem.start[:2])
+        return cls(field, problem.vehicle.required_clearance, problem.start[:2], objective=objective)
 
     def finish(self) -> None:
         """Compute all costs now, so that several threads may ask for them."""
@@ -53,10 +56,11 @@ class CostToGo:
 
     def prepare_bound(self) -> None:
         """Do most of the work of `make_bound`; the costs stay as they are, so that another thread may use them meanwhile."""
-        self.kernel.prepare_bound()
+        self.kernel.prepare_bound(self._objective.slowness(is_bound=True) if self._objective else None)
 
     def make_bound(self) -> "CostToGo":
         """Make the costs lower bounds, which takes several times as long as to compute them at first."""
+        self.prepare_bound()
         self.kernel.make_bound()
         return self
 

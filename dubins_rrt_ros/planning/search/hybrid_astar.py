@@ -16,7 +16,7 @@ from ..deadline import never
 from ..problem import Problem
 from ..settings import Settings
 from .background import BACKGROUND, BackgroundJob
-from .cost import path_cost
+from .cost import Objective
 from .cost_to_go import CostToGo
 from .pace import Pace
 from .smoothing import smooth
@@ -26,6 +26,8 @@ from .smoothing import smooth
 #: FIRST_VISIT_PENALTY.
 FIRST_RUNS = ((0.5, 16), (0.3, 24), (0.15, 32))
 FIRST_WEIGHT, FIRST_VISIT_PENALTY = 2.0, 0.5
+#: Cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends such a run.
+GOOD_ENOUGH = 1.5
 #: Runs for narrow places, which follow by turns as long as there is no path: in a tunnel that leaves millimetres turns must begin
 #: just where they have to, so arcs have random lengths, and a pose is expanded again and again. Length of the arcs in turning
 #: radii, range of its random factor, number of headings, and penalties in arcs: of a pose for each time that it was expanded, and
@@ -59,8 +61,16 @@ class HybridAStarRuns:
         exhausted: True if no run is left, as too many in a row were in vain.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo):
-        self._problem, self._field, self._to_goal = problem, field, to_goal
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo,
+                 length_to_goal: CostToGo | None = None):
+        """Prepare the runs.
+
+        Args:
+            to_goal, length_to_goal: cost and length to the goal; without the latter they are the same.
+        """
+        self._problem, self._field, self._to_goal, self._length_to_goal = problem, field, to_goal, length_to_goal or to_goal
+        self._objective = Objective.of(problem, settings, field)
+        self._edge_cost = self._objective.edge_cost()
         self._checker = field.collision_checker(problem.vehicle)
         self._settings = settings
         self._goals = _goals(problem)
@@ -124,8 +134,8 @@ class HybridAStarRuns:
         is_first = best_cost == math.inf
         if path and not is_first and self._settings.shortcut:
             for first_round in (True, False):
-                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, interrupted)
-        self._count(path is not None and path_cost(path) < best_cost, is_first)
+                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, interrupted, self._objective)
+        self._count(path is not None and self._objective.path_cost(path) < best_cost, is_first)
         # Not even arcs of all lengths lead anywhere from the start.
         self.exhausted = self.exhausted or (is_first and self._in_vain > len(FIRST_RUNS) and run.size == 1)
         return path
@@ -149,7 +159,8 @@ class HybridAStarRuns:
             return self._narrow_run(self._in_vain - len(FIRST_RUNS))
         arc, headings, weight = self._measures(is_first)
         return self._new_run(arc, headings, weight, FIRST_VISIT_PENALTY if is_first else 0.0,
-                             limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED)
+                             limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED,
+                             good_enough=GOOD_ENOUGH if is_first else 0.0)
 
     def _narrow_run(self, number: int) -> HybridAStar:
         """Return the run of this number for narrow places."""
@@ -157,7 +168,7 @@ class HybridAStarRuns:
         factors = np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS))
         expansions = min(NARROW_EXPANSIONS * NARROW_GROWTH ** (number // len(NARROW_RUNS)), MOST_NARROW_EXPANSIONS)
         return self._new_run(arc, headings, FIRST_WEIGHT, visit_penalty, limit=UNLIMITED, max_expanded=expansions,
-                             arc_factors=factors, retry_penalty=retry_penalty)
+                             arc_factors=factors, retry_penalty=retry_penalty, good_enough=GOOD_ENOUGH)
 
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
         """Return a run with arcs of this length in turning radii, and headings in its closed set."""
@@ -166,7 +177,8 @@ class HybridAStarRuns:
         turning_arc = min(arc * scale, max(arc, math.tau / headings) * radius)
         corners = problem.map.corners()
         return HybridAStar(
-            checker=self._checker, radius=radius, start=problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
+            checker=self._checker, edge_cost=self._edge_cost, radius=radius, start=problem.start, goals=self._goals,
+            to_goal=self._to_goal.kernel, length_to_goal=self._length_to_goal.kernel,
             corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * scale, turning_arc=turning_arc,
             sectors=headings, weight=weight, visit_penalty=visit_penalty, **options)
 

@@ -12,7 +12,7 @@ from ..curves import dubins
 from ..curves.path import Path
 from ..problem import Pose
 from ..vehicle import Vehicle
-from .cost import edge_costs
+from .cost import lengths_of
 
 #: Maximum distance between two poses of the path at which others join or leave it, in turning radii.
 SPACING = 0.5
@@ -38,7 +38,7 @@ class KnownPath:
     def __init__(self, path: Path, field: ClearanceField, vehicle: Vehicle):
         self._path = path.cut(SPACING * vehicle.turning_radius)
         self._radius = vehicle.turning_radius
-        self._along = np.append(0.0, np.cumsum(edge_costs(self._path.lengths[1:])))
+        self._along = np.append(0.0, np.cumsum(lengths_of(self._path.lengths[1:])))
         self._checker = field.collision_checker(vehicle)
 
     @property

@@ -39,7 +39,7 @@ from ..curves.path import Path
 from ..deadline import Deadline, never
 from ..problem import Problem
 from ..settings import Settings
-from .cost import path_cost
+from .cost import Objective
 from .cost_bounds import CostBounds
 from .cost_to_go import CostToGo
 from .hybrid_astar import HybridAStarRuns
@@ -80,6 +80,7 @@ class Search:
         samples: number of samples used so far.
         best: the node that reaches the goal at the least cost, or -1.
         found_by: what found the path there, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one.
+        objective: what is minimised.
         ready: True if there is a path whose smoothing has been done; better ones that are still to be smoothed do not matter.
         bound: the cost-to-go as a lower bound, once it is one, or None.
     """
@@ -94,6 +95,7 @@ class Search:
             deadline: when it is over what is under way is cut short; the steps of `run` that follow it are unspecified.
             report_samples: number of samples after each of which a step of `run` ends; 0 for any.
         """
+        self.objective = Objective.of(problem, settings, field)
         corners = problem.map.corners()
         lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
         vehicle = problem.vehicle
@@ -107,15 +109,17 @@ class Search:
         self._problem, self._settings, self._seed_path = problem, settings, seed_path
         self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
         self._kernel = RrtKernel(
-            tree=self._tree, checker=field.collision_checker(vehicle), step=settings.step_size, near_factor=NEAR_FACTOR,
-            max_near=MOST_NEAR, goal=problem.goal, tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
+            tree=self._tree, checker=field.collision_checker(vehicle), edge_cost=self.objective.edge_cost(),
+            step=settings.step_size, near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=problem.goal,
+            tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
         self._runs: HybridAStarRuns | None = None
         self._bounds: CostBounds | None = None
         if settings.informed and to_goal:
-            self._runs = HybridAStarRuns(problem, settings, field, to_goal)
-            self._bounds = CostBounds(problem, field, to_goal)
+            length_to_goal = to_goal if self.objective.is_length else CostToGo.to_goal(problem, field)
+            self._runs = HybridAStarRuns(problem, settings, field, to_goal, length_to_goal)
+            self._bounds = CostBounds(problem, field, to_goal, length_to_goal, self.objective)
         self._sampler = Sampler(problem, settings, field, to_goal)
-        self._smoother = Smoother(vehicle, field, settings.seed, self._deadline.poll)
+        self._smoother = Smoother(self.objective, settings.seed, self._deadline.poll)
 
     @property
     def size(self) -> int:
@@ -131,6 +135,16 @@ class Search:
     def path(self) -> Path | None:
         """The best path so far, or None; the tree is not copied for it."""
         return path_to(self.best, self._tree) if self.best >= 0 else None
+
+    def simplified(self) -> Path:
+        """Return the best path with fewer curves, at hardly more cost; the same where the cost is the length."""
+        return self._smoother.simplify(path_to(self.best, self._tree))
+
+    def tree_with(self, path: Path) -> Tree:
+        """Return a copy of the tree, with a path that is not the best as a branch of its own."""
+        if self.best >= 0 and path == self.path:
+            return self.tree
+        return self.tree.with_path(path, self.objective.curve_costs(path))
 
     @property
     def cost(self) -> float:
@@ -184,6 +198,10 @@ class Search:
         if not self._bounds or not self.wait(seconds) or (seconds < math.inf and not self._bounds.wait(seconds)):
             return None
         return self._bounds.make_to_goal()
+
+    def make_length_bound(self) -> CostToGo | None:
+        """Make the length to the goal a lower bound, and return it; None unless informed. To be called after `make_bound`."""
+        return self._bounds.make_length_to_goal() if self._bounds else None
 
     def _may_end(self, smoothing_is_due: bool = False) -> bool:
         return self.best < 0 or (not smoothing_is_due and (self.samples > 0 or self._is_rrt))
@@ -241,6 +259,7 @@ class Search:
         if self._bounds:
             if self.best < 0:
                 self._bounds.to_goal.finish()  # hybrid A* goes on in the background of the samples, and asks for it too
+                self._bounds.length_to_goal.finish()
             self._bounds.start(from_start=not self._is_rrt)
 
     def _take_block(self, batch: int) -> Generator[bool, None, int]:
@@ -339,14 +358,14 @@ class Search:
             before, path = self.cost, self.path
             if path:
                 smoothed = self._smoother.smooth(path, first_round=number == 0)
-                if path_cost(smoothed) < before:
+                if self.objective.path_cost(smoothed) < before:
                     self._insert(smoothed, self.best)
             self._smoother.record(before, self.cost)
             yield self._may_end(smoothing_is_due=number + 1 < ROUNDS)
 
     def _insert_if_better(self, path: Path | None) -> None:
         """Add a path that hybrid A* found to the tree, if it is the best."""
-        if path is not None and path_cost(path) < self.cost:
+        if path is not None and self.objective.path_cost(path) < self.cost:
             self._insert(path, self.best if self._problem.exact_goal else -1)
             self.found_by = "hybrid_astar"
 

@@ -10,7 +10,7 @@ from ..curves.angles import wrap
 from ..curves.path import Path
 from ..problem import Problem
 from ..settings import Settings
-from .cost import path_cost
+from .cost import Objective
 from .cost_to_go import CostToGo
 from .headings import Headings
 
@@ -33,6 +33,7 @@ class Sampler:
         """Prepare the draws; `to_goal` is needed where `from_start` will be given, and for headings along the cost-to-go."""
         self._problem, self._settings = problem, settings
         self._field, self._to_goal = field, to_goal
+        self._objective = Objective.of(problem, settings, field)
         self._headings = Headings(problem, settings, to_goal)
         self._informed_set: tuple[np.ndarray, np.ndarray] | None = None  # squares, and lower bounds of the costs over them
         self._limit = math.inf  # of the costs over the informed set
@@ -51,7 +52,7 @@ class Sampler:
         """
         poses = np.empty((count, 3))
         if from_start and best:
-            poses[:, :2] = self._where_cheaper(count, from_start, path_cost(best))
+            poses[:, :2] = self._where_cheaper(count, from_start, self._objective.path_cost(best))
         else:
             poses[:, :2] = self._anywhere(count)
         poses[:, 2] = self._headings.draw(poses[:, :2], self._rng)

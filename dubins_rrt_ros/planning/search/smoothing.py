@@ -1,4 +1,4 @@
-"""Smoothing: shortcuts and moved waypoints make a path shorter, and keep it free."""
+"""Smoothing: shortcuts and moved waypoints make a path cheaper, and keep it free; a price of each curve makes it simpler."""
 
 import math
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..deadline import never
 from ..vehicle import Vehicle
+from .cost import Objective
 from .pace import Pace
 
 #: Number of changes that are tried in one round.
@@ -19,23 +20,28 @@ TRIES = 512
 FIRST_SLICE = 16
 #: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
 FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
+#: Price of a curve of a path that is published, in turning radii, and number of rounds that simplify it.
+PRICE, SIMPLIFICATIONS = 0.005, 4
 #: Minimum gain of a round, relative to the cost, that makes another one worthwhile.
 WORTHWHILE_GAIN = 1e-4
 
 
 def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool,
-           interrupted: Callable[[], bool] = never) -> Path:
-    """Return a path with the same ends that is never longer.
+           interrupted: Callable[[], bool] = never, objective: Objective | None = None, price: float = 0.0) -> Path:
+    """Return a path with the same ends that never costs more, but for what the price of curves saves.
 
     Args:
         path: it is free for the vehicle, and so is what is returned.
         first_round: True if it was not smoothed before, and may have large loops.
         interrupted: called every few milliseconds; True ends the round with the path as it is by then.
+        objective: the cost; None makes it the length.
+        price: what a curve more may save [m]; without effect where the cost is the length.
     """
     draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
-    shortcutter = Shortcutter(checker=field.collision_checker(vehicle), radius=path.radius,
+    edge_cost = (objective or Objective(vehicle, field)).edge_cost()
+    shortcutter = Shortcutter(checker=field.collision_checker(vehicle), edge_cost=edge_cost, radius=path.radius,
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
-                              tries=TRIES)
+                              tries=TRIES, price=price)
     pace, tried = Pace(FIRST_SLICE, TRIES), 0
     while tried < TRIES and not interrupted():
         begin, tried = tried, min(tried + pace.size, TRIES)
@@ -49,8 +55,8 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
 class Smoother:
     """Smooths the best path of a search as long as that is worthwhile, by random numbers of its own."""
 
-    def __init__(self, vehicle: Vehicle, field: ClearanceField, seed: int, interrupted: Callable[[], bool]):
-        self._vehicle, self._field, self._seed, self._interrupted = vehicle, field, seed, interrupted
+    def __init__(self, objective: Objective, seed: int, interrupted: Callable[[], bool]):
+        self._objective, self._seed, self._interrupted = objective, seed, interrupted
         self._exhausted_at = math.inf
 
     @cached_property
@@ -58,8 +64,23 @@ class Smoother:
         return np.random.default_rng((self._seed, 2))  # apart from those of the samples and of hybrid A*
 
     def smooth(self, path: Path, first_round: bool) -> Path:
-        """Return a path with the same ends that is never longer."""
-        return smooth(path, self._vehicle, self._field, self._rng, first_round, self._interrupted)
+        """Return a path with the same ends that never costs more."""
+        return smooth(path, self._objective.vehicle, self._objective.field, self._rng, first_round, self._interrupted,
+                      self._objective)
+
+    def simplify(self, path: Path) -> Path:
+        """Return a path with the same ends and fewer curves that costs hardly more; the same path where the cost is the length.
+
+        A bend that is wider than the turning radius is no Dubins curve, and the search makes it of many.
+        """
+        if self._objective.is_length:
+            return path
+        rng = np.random.default_rng((self._seed, 4))
+        price = PRICE * self._objective.vehicle.maneuver_scale
+        for _ in range(SIMPLIFICATIONS):
+            path = smooth(path, self._objective.vehicle, self._objective.field, rng, False, self._interrupted, self._objective,
+                          price)
+        return path
 
     def record(self, before: float, after: float) -> None:
         """Record the costs of the best path before and after a round."""

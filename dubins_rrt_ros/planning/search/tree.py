@@ -14,7 +14,7 @@ from ..errors import PlanningError
 from ..pictures import Plottable, check_matplotlib
 from ..problem import Pose
 from ..vehicle import Vehicle
-from .cost import edge_costs
+from .cost import lengths_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,9 +32,10 @@ class Tree(Plottable):
         radius: turning radius of all edges [m].
         poses: (n, 3) float64: x [m], y [m], theta [rad].
         parents: (n,) int32; the start's is -1.
-        costs: (n,) float64: costs of the paths from the start, which are their lengths [m].
+        costs: (n,) float64: costs of the paths from the start [m].
         words: (n,) int8, indices into WORDS; an edge is driven from the parent's pose.
         lengths: (n, 3) float64: lengths of the three arcs of each edge [m].
+        edge_costs: (n,) float64: costs of the edges [m]; their lengths where that is what was minimised.
     """
 
     radius: float
@@ -43,31 +44,27 @@ class Tree(Plottable):
     costs: np.ndarray
     words: np.ndarray
     lengths: np.ndarray
+    edge_costs: np.ndarray
 
     @classmethod
     def copy_of(cls, tree: SearchTree) -> "Tree":
         """Copy the tree of a search under way."""
-        arrays = (np.array(view[:tree.size]) for view in (tree.poses, tree.parents, tree.costs, tree.words, tree.lengths))
+        arrays = (np.array(view[:tree.size])
+                  for view in (tree.poses, tree.parents, tree.costs, tree.words, tree.lengths, tree.edge_costs))
         return cls(tree.radius, *arrays)
 
     @classmethod
     def of_root(cls, root: Pose, radius: float) -> "Tree":
         """Return a tree of its root alone."""
-        return cls(radius, np.array([root]), np.array([-1], np.int32), np.zeros(1), np.zeros(1, np.int8), np.zeros((1, 3)))
+        return cls(radius, np.array([root]), np.array([-1], np.int32), np.zeros(1), np.zeros(1, np.int8), np.zeros((1, 3)),
+                   np.zeros(1))
 
     @classmethod
-    def of_path(cls, path: Path) -> "Tree":
-        """Return the tree of a path alone."""
-        costs = np.cumsum([0.0, *edge_costs(path.lengths[1:])])
-        return cls(path.radius, path.waypoints, np.arange(-1, len(costs) - 1, dtype=np.int32), costs, path.words, path.lengths)
-
-    def after(self, path: Path) -> "Tree":
-        """Return the tree with a path in front of it, which leads to its root."""
-        before = len(path.words) - 1
-        parents = np.append(np.arange(-1, before), np.where(self.parents[1:] < 0, -1, self.parents[1:] + before)).astype(np.int32)
-        poses, words, lengths = (np.concatenate([ahead, own[1:]]) for ahead, own in (
-            (path.waypoints, self.poses), (path.words, self.words), (path.lengths, self.lengths)))
-        return Tree(self.radius, poses, parents, _costs(parents, lengths), words, lengths)
+    def of_path(cls, path: Path, edge_costs: np.ndarray) -> "Tree":
+        """Return the tree of a path alone, given the (n,) costs of its curves."""
+        edge_costs = np.append(0.0, edge_costs)
+        parents = np.arange(-1, len(edge_costs) - 1, dtype=np.int32)
+        return cls(path.radius, path.waypoints, parents, np.cumsum(edge_costs), path.words, path.lengths, edge_costs)
 
     def __len__(self) -> int:
         return len(self.parents)
@@ -79,6 +76,15 @@ class Tree(Plottable):
     def path_to(self, node: int) -> Path:
         """Return the path from the start to `node`."""
         return path_to(node, self)
+
+    def with_path(self, path: Path, edge_costs: np.ndarray) -> "Tree":
+        """Return the tree with a path from its root as a branch of its own, given the (n,) costs of the path's curves."""
+        new, first = len(path.words) - 1, len(self)
+        parents = np.arange(first - 1, first + new - 1, dtype=np.int32)
+        parents[:1] = 0
+        added = path.waypoints[1:], parents, np.cumsum(edge_costs), path.words[1:], path.lengths[1:], edge_costs
+        arrays = self.poses, self.parents, self.costs, self.words, self.lengths, self.edge_costs
+        return Tree(self.radius, *(np.concatenate(both) for both in zip(arrays, added, strict=True)))
 
     def segments(self, spacing: float, most: int | None = None) -> np.ndarray:
         """Return (m, 2, 2) float64 ends (x, y) [m] of straight pieces that draw all edges, turns in pieces of `spacing` [m].
@@ -123,9 +129,12 @@ class Tree(Plottable):
             raise TreeError(f"node {int(np.argmax(ancestor >= 0))} is below a cycle")
         if not (self.lengths >= 0).all():
             raise TreeError(f"node {int(np.argmin((self.lengths >= 0).all(axis=1)))} has an arc that is not at least 0 long")
-        wrong = np.flatnonzero(self.costs[1:] != self.costs[parents[1:]] + edge_costs(self.lengths[1:])) + 1
+        wrong = np.flatnonzero(self.costs[1:] != self.costs[parents[1:]] + self.edge_costs[1:]) + 1
         if len(wrong):
             raise TreeError(f"the cost of node {wrong[0]} is not its parent's and that of its edge")
+        wrong = np.flatnonzero(self.edge_costs[1:] < lengths_of(self.lengths[1:])) + 1
+        if len(wrong):
+            raise TreeError(f"the edge to node {wrong[0]} costs less than its length")
         for node in range(1, n):
             self._check_edge(node, field, vehicle)
 
@@ -136,17 +145,6 @@ class Tree(Plottable):
             raise TreeError(f"the edge to node {node} ends at {end}, not at {pose}")
         if field and vehicle and not field.curve_is_free(curve, vehicle):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
-
-
-def _costs(parents: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return the (n,) costs of nodes, each its parent's and that of its edge."""
-    edges, costs = edge_costs(lengths), np.zeros(len(parents))
-    known = parents < 0
-    while not known.all():
-        new = ~known & known[parents]
-        costs[new] = costs[parents[new]] + edges[new]
-        known |= new
-    return costs
 
 
 def path_to(node: int, tree: Tree | SearchTree) -> Path:
