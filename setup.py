@@ -38,8 +38,9 @@ def installed(folder, *patterns):
 
 ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 PLOTS = ["matplotlib>=3.6", "tqdm>=4.64"]
+PLAY = ["aiohttp>=3.8"]
 TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "mypy>=1.8", "types-PyYAML>=6.0",
-        "ruff>=0.6", *PLOTS]
+        "ruff>=0.6", "selenium>=4.10", *PLOTS, *PLAY]
 
 setup(
     name=PACKAGE,
@@ -50,7 +51,8 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.planning._kernels": ["*.pxd"]},
+    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.planning._kernels": ["*.pxd"],
+                  f"{PACKAGE}.cli.play": ["*.html", "*.css", "*.js"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         installed("", "package.xml"),
@@ -61,7 +63,7 @@ setup(
     ],
     install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0"],
     # Pictures and progress bars; a robot plans without them. What dubins_rrt_ros.evaluation imports besides is the same today.
-    extras_require={"ros": ROS, "plots": PLOTS, "evaluation": PLOTS, "test": TEST},
+    extras_require={"ros": ROS, "plots": PLOTS, "play": PLAY, "evaluation": PLOTS, "test": TEST},
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.__main__:main",

@@ -33,6 +33,7 @@ COMMANDS = {
     "families": Command("plan problems that are solvable by construction", "dubins_rrt_ros.evaluation.families.command"),
     "figures": Command("draw the figures of the documentation", "dubins_rrt_ros.evaluation.figures.command"),
     "paper": Command("measure again what the paper measured", "dubins_rrt_ros.evaluation.paper.command"),
+    "play": Command("drag start and goal in the browser, and see the path follow", "dubins_rrt_ros.cli.play.command"),
     "render": Command("make a map_server pair of a polygon map", "dubins_rrt_ros.cli.render"),
     "completion": Command("let the tab key complete commands, flags and map names", "dubins_rrt_ros.cli.completion"),
 }

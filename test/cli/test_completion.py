@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import pty
+import select
 import shutil
 import subprocess
 import termios
@@ -53,7 +54,7 @@ def bash(folder):
 
 def test_bash_completes_the_commands(bash):
     assert {"plan", "audit", "bench", "campaign", "demo", "paper", "render", "completion", "--help", "--version"} <= bash("")
-    assert bash("pl") == {"plan"}
+    assert bash("pl") == {"plan", "play"}
 
 
 @pytest.mark.parametrize("command", ["plan", "audit", "bench", "campaign", "demo", "paper", "render"])
@@ -102,9 +103,9 @@ def test_maps_that_come_later_are_completed_too(tmp_path, monkeypatch, bash):
 
 
 def test_the_tab_key_completes_in_a_terminal():
-    """A line as it is typed, every word of it cut short; files in the shell's own way."""
+    """A line as it is typed, its words cut short; files in the shell's own way."""
     Path("script").write_text(script("bash"))
-    typed = "dubins_rrt pl\tpark\t--planner rrt_\t--json pl\t--csv 'map o\t\n"
+    typed = "dubins_rrt plan\tpark\t--planner rrt_\t--json pl\t--csv 'map o\t\n"
     assert "<plan><parking.geojson><--planner><rrt_star><--json><plan.json><--csv><map of mine.wkt>" in _typed_into_bash(typed)
 
 
@@ -127,6 +128,7 @@ def _typed_into_bash(line):
 def _read_until(terminal, end):
     shown = b""
     while end not in shown:
+        assert select.select([terminal], [], [], 60)[0], shown
         shown += os.read(terminal, 4096)
     return shown.decode()
 
@@ -141,7 +143,8 @@ def test_zsh_reads_the_script():
 
 @pytest.mark.skipif(not shutil.which("fish"), reason="fish is not installed")
 @pytest.mark.parametrize("line, replies", [
-    ("pl", {"plan"}), ("plan ma", {"maze", "maze.geojson", "map of mine.wkt"}), ("plan maze --planner ", {"rrt", "rrt_star"}),
+    ("pl", {"plan", "play"}), ("plan ma", {"maze", "maze.geojson", "map of mine.wkt"}),
+    ("plan maze --planner ", {"rrt", "rrt_star"}),
     ("plan maze --goal-t", {"--goal-tolerance-xy", "--goal-tolerance-yaw"}), ("plan --json pl", {"plan.json"}),
     ("render --out g", {"grids/"}), ("plan --seed ", set())])
 def test_fish_completes_likewise(line, replies):
