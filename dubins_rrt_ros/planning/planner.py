@@ -230,12 +230,14 @@ class _Call:
             return True
         return False
 
-    def _audited(self, path: Path, search: Search, simplify: bool = True) -> _Audited:
+    def _audited(self, path: Path, search: Search, simplify: bool = True, is_last: bool = False) -> _Audited:
         """Simplify and audit a path once: an improvement that was reported is often the answer too."""
         simple = path
         if simplify and not search.objective.is_length:
             known = self._best if self._best and self._best.is_simple and self._best.found == path else None
             simple = known.path if known else self._simplified(search)
+        if is_last:
+            simple = search.without_short_arcs(simple)
         self._found_cost = search.cost
         return _Audited(simple, self._audit(simple), search.tree_with(simple), search.samples, search.found_by,
                         search.objective.path_cost(simple), path, simplify or search.objective.is_length)
@@ -294,8 +296,9 @@ class _Call:
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
         """Return the plan with the best path; without it where it fails its audit, with the one before where the time is up."""
         try:
-            audited = self._audited(path, search) if search else _Audited(path, self._audit(path), tree, samples)
+            audited = self._audited(path, search, is_last=True) if search else _Audited(path, self._audit(path), tree, samples)
         except OutOfTime:
+            cancelled = cancelled or self._deadline.cancelled
             return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples, cancelled)
         if not audited.audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audited.audit}. Please report it."

@@ -176,7 +176,8 @@ def test_a_plan_that_ends_at_once_has_the_bound_of_one_that_does_not(planner):
 @pytest.mark.parametrize("asked", [3, 4, 5, 6, 7, 9, 12, 16, 30, 60])
 def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems, monkeypatch):
     """By seed and number of samples, also where hybrid A* found the path before the first one, on however slow a machine."""
-    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.CANCEL_GRACE", 600.0)
+    for grace in ("CANCEL_GRACE", "CANCEL_AUDIT_GRACE"):
+        monkeypatch.setattr(f"dubins_rrt_ros.planning.deadline.{grace}", 600.0)
     count = []
     result = plan(problems["maze"], Settings(planner=planner, seed=3, samples=scaled(3000), planning_time=600.0),
                   cancel=lambda: count.append(1) or len(count) >= asked)

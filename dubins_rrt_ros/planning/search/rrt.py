@@ -45,6 +45,7 @@ from .cost_to_go import CostToGo
 from .hybrid_astar import HybridAStarRuns
 from .lower_bound import lower_bound
 from .sampling import Sampler
+from .short_arcs import merge_short_arcs
 from .smoothing import Smoother
 from .tree import Tree, path_to
 
@@ -139,6 +140,12 @@ class Search:
     def simplified(self) -> Path:
         """Return the best path with fewer curves, at hardly more cost; the same where the cost is the length."""
         return self._smoother.simplify(path_to(self.best, self._tree))
+
+    def without_short_arcs(self, path: Path) -> Path:
+        """Return a path with its short arcs merged, as far as there is time; the same where paths are not smoothed."""
+        if not self._settings.shortcut:
+            return path
+        return merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll)
 
     def tree_with(self, path: Path) -> Tree:
         """Return a copy of the tree, with a path that is not the best as a branch of its own."""
