@@ -59,7 +59,7 @@ setup(
         installed("maps", "maps/*"),
         installed("config", "config/*"),
         # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
-        (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt"]),
+        (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt_planner", "resource/dubins_rrt"]),
     ],
     install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0"],
     # Pictures and progress bars; a robot plans without them. What dubins_rrt_ros.evaluation imports besides is the same today.
@@ -67,6 +67,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.__main__:main",
+            f"dubins_rrt_planner = {PACKAGE}.node.__main__:main",  # where others' planners are on the PATH
             f"dubins_rrt = {PACKAGE}.__main__:main",
         ],
     },

@@ -22,9 +22,9 @@ def prefix() -> Path:
     return found[0]
 
 
-def test_ros2_run_finds_both_executables(prefix):
+def test_ros2_run_finds_all_executables(prefix):
     """`ros2 run` takes what is executable in lib/PACKAGE of the package's prefix."""
-    for name in ("planner", "dubins_rrt"):
+    for name in ("planner", "dubins_rrt_planner", "dubins_rrt"):
         assert os.access(prefix / "lib" / "dubins_rrt_ros" / name, os.X_OK), name
 
 

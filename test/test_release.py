@@ -25,6 +25,7 @@ def test_the_version_is_the_same_everywhere():
     assert released, 'CHANGELOG.rst has no version yet; give "Forthcoming" the form "0.1.0 (2026-11-23)", as bloom wants it'
     version = released[0].partition(" ")[0]
     assert version == in_package_xml("version") == in_setup("version") == dubins_rrt_ros.__version__
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 
 
 def test_the_changelog_has_the_form_that_bloom_reads():
