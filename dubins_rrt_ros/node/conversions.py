@@ -2,7 +2,7 @@
 
 import array
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -17,6 +17,8 @@ from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, Polygo
 from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 from dubins_rrt_ros.planning.problem import Pose
 from dubins_rrt_ros.planning.text import one_line, quoted_name
+
+from .rigid import Rigid, Rotation
 
 #: Minimum norm of a quaternion that is taken, and the deviation from 1 beyond which it is doubtful.
 LEAST_NORM, DOUBTFUL_NORM = 1e-3, 0.1
@@ -88,30 +90,26 @@ def pose_message(pose: Pose) -> PoseMessage:
     return message
 
 
-def transformed(pose: PoseMessage, transform: Transform) -> PoseMessage:
+def transformed(pose: PoseMessage, transform: Rigid) -> PoseMessage:
     """Return a pose in a transform's parent frame, as tf2 does: rotate, then translate."""
-    t, p, q = transform.translation, pose.position, pose.orientation
-    turn = _Quaternion(*(getattr(transform.rotation, axis) for axis in "wxyz"))
-    x, y, z = _product(_product(turn, _Quaternion(0.0, p.x, p.y, p.z)), turn.conjugate)[1:]
-    w, i, j, k = _product(turn, _Quaternion(q.w, q.x, q.y, q.z))
-    return PoseMessage(position=Point(x=x + t.x, y=y + t.y, z=z + t.z), orientation=Quaternion(w=w, x=i, y=j, z=k))
+    p, q = pose.position, pose.orientation
+    moved = transform.after(Rigid(p.x, p.y, p.z, Rotation(q.w, q.x, q.y, q.z)))
+    w, i, j, k = moved.rotation
+    return PoseMessage(position=Point(x=moved.x, y=moved.y, z=moved.z), orientation=Quaternion(w=w, x=i, y=j, z=k))
 
 
-class _Quaternion(NamedTuple):
-    w: float
-    x: float
-    y: float
-    z: float
-
-    @property
-    def conjugate(self) -> "_Quaternion":
-        return _Quaternion(self.w, -self.x, -self.y, -self.z)
+def nanoseconds(stamp: Time) -> int:
+    """Return a time as a number [ns]."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    """Return the Hamilton product: the turn `b`, then the turn `a`."""
-    return _Quaternion(a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-                       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w)
+def rigid_from(transform: Transform) -> Rigid | None:
+    """Return the transform of a message, its quaternion normalised; None where it is none, as tf2 ignores it."""
+    t, q = transform.translation, transform.rotation
+    norm = _norm(q)
+    if not all(map(math.isfinite, (t.x, t.y, t.z))) or not LEAST_NORM <= norm < math.inf:
+        return None
+    return Rigid(t.x, t.y, t.z, Rotation(q.w / norm, q.x / norm, q.y / norm, q.z / norm))
 
 
 def poses_of(plan: Plan | None) -> np.ndarray:

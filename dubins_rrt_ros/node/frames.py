@@ -1,47 +1,52 @@
-"""Transforms of poses to the global frame, by tf2 where it is installed."""
+"""Poses in the global frame: those of messages, and the vehicle's by its transform."""
 
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Transform
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from rclpy.node import Node
-from rclpy.time import Time
 
 from dubins_rrt_ros.planning import InvalidPose, Status
 from dubins_rrt_ros.planning.problem import Pose
 from dubins_rrt_ros.planning.text import quoted_name
 
-from .conversions import bare_pose, doubts_about, has_rotation, pose_from, transformed
-from .request import Refusal
+from .conversions import bare_pose, doubts_about, has_rotation, nanoseconds, pose_from, transformed
+from .parameters import Parameters
+from .request import NotYet, Refusal
+from .rigid import Rigid
+from .transform_buffer import TransformUnknown
+from .transforms import transforms
 
-try:
-    import tf2_ros
-except ImportError:  # part of an installation of ROS, not of the packages for pip
-    tf2_ros = None
+#: What to install for transforms.
+REMEDY = "neither tf2_ros nor tf2_msgs is installed (ros-jazzy-tf2-ros-py)"
 
 
 class Frames:
-    """Transforms stamped poses to the global frame, by the latest transform."""
+    """Transforms stamped poses to the global frame, each at its stamp, and knows where the vehicle's frame is."""
 
-    def __init__(self, node: Node, frame: str):
-        self._logger = node.get_logger()
-        self._frame = frame
+    def __init__(self, node: Node, parameters: Parameters, frame: str):
+        self._logger, self._clock = node.get_logger(), node.get_clock()
+        self._parameters, self._frame = parameters, frame
         self._doubts: set[tuple[str, str]] = set()  # that were logged: the pose's name and the kind
-        if tf2_ros is not None:
-            self._buffer = tf2_ros.Buffer()
-            self._listener = tf2_ros.TransformListener(self._buffer, node)
+        self._transforms = transforms(node)
+
+    @property
+    def follows_vehicle(self) -> bool:
+        """True if the vehicle's pose is that of a frame."""
+        return bool(self._parameters.read().node.robot_base_frame)
 
     def is_global(self, frame: str) -> bool:
         """Return True if poses in this frame need no transform."""
         return frame in ("", self._frame)
 
     def pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped, any_heading: bool = False) -> Pose:
-        """Return the (x, y, yaw) of a message's pose in the global frame.
+        """Return the (x, y, yaw) of a message's pose in the global frame; any thread may ask for it.
 
         Args:
             name: what the pose is, for messages.
-            message: a pose in any frame.
+            message: a pose in any frame; it is transformed at its stamp, at the latest time where that is 0.
             any_heading: True if its heading does not matter; then a quaternion of zeros is taken for no rotation.
 
         Raises:
+            NotYet: its transform is not known yet.
             Refusal: it cannot be transformed, or is not a pose; `name` is in the message.
         """
         pose, frame = bare_pose(message), message.header.frame_id
@@ -50,13 +55,30 @@ class Frames:
         if not frame:
             self._logger.warning(f"A {name} pose without frame_id is taken to be in '{self._frame}'", once=True)
         elif frame != self._frame:
-            pose = transformed(pose, self._latest(name, frame))
+            pose = transformed(pose, self._lookup(name, frame, nanoseconds(message.header.stamp) or None)[0])
         try:
             planar = pose_from(name, pose)
         except InvalidPose as error:
             raise Refusal(Status.INVALID_POSE, str(error)) from None
         self._warn_once(name, pose)
         return planar
+
+    def vehicle(self) -> Pose:
+        """Return the (x, y, yaw) of the vehicle's frame at the latest time; any thread may ask for it.
+
+        Raises:
+            NotYet: its transform is not known yet, or too old.
+            Refusal: transforms are not known at all, or it is no pose in the plane.
+        """
+        options = self._parameters.read().node
+        found, stamp = self._lookup("start", options.robot_base_frame, None)
+        if stamp is not None and (age := (self._clock.now().nanoseconds - stamp) / 1e9) > options.transform_max_age:
+            raise self._not_yet("start", options.robot_base_frame, f"the latest transform is {age:.1f} s old, more than "
+                                                                   f"transform_max_age ({options.transform_max_age:g} s)")
+        try:
+            return pose_from("start", transformed(PoseMessage(), found))
+        except InvalidPose as error:
+            raise Refusal(Status.INVALID_POSE, str(error)) from None
 
     def _warn_once(self, name: str, pose: PoseMessage) -> None:
         """Log what is unusual about a pose that is taken: each kind once for starts, and once for goals."""
@@ -65,16 +87,22 @@ class Frames:
                 self._doubts.add((name, kind))
                 self._logger.warning(doubt)
 
-    def _latest(self, name: str, frame: str) -> Transform:
+    def _lookup(self, name: str, frame: str, stamp: int | None) -> tuple[Rigid, int | None]:
         if frame.startswith("/"):
-            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or", True)
-        if tf2_ros is None:
-            raise self._refusal(name, frame, "tf2_ros is not installed (ros-jazzy-tf2-ros-py); install it, or", True)
+            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or")
+        if self._transforms is None:
+            raise self._refusal(name, frame, f"{REMEDY}; install one, or")
         try:
-            return self._buffer.lookup_transform(self._frame, frame, Time()).transform
-        except tf2_ros.TransformException as error:
-            raise self._refusal(name, frame, f"{' '.join(str(error).split()).rstrip('.')}; publish that transform, or") from None
+            return self._transforms.lookup(self._frame, frame, stamp)
+        except TransformUnknown as error:
+            if error.is_final:
+                raise self._refusal(name, frame, f"{error}; send it sooner, or") from None
+            raise self._not_yet(name, frame, str(error)) from None
 
-    def _refusal(self, name: str, frame: str, why: str, is_final: bool = False) -> Refusal:
+    def _not_yet(self, name: str, frame: str, why: str) -> NotYet:
+        refusal = self._refusal(name, frame, f"{why}; publish that transform, or", is_final=False)
+        return NotYet("a transform", self._parameters.read().node.transform_tolerance, lambda: refusal)
+
+    def _refusal(self, name: str, frame: str, why: str, is_final: bool = True) -> Refusal:
         return Refusal(Status.TF_ERROR, f"The {name} pose is in frame {quoted_name(frame)} and cannot be transformed to "
                                         f"'{self._frame}': {why} publish the pose in '{self._frame}'.", is_final)

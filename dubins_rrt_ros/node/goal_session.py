@@ -25,7 +25,7 @@ from .readiness import Readiness
 from .request import Route
 from .worker import Job
 
-#: Time between two attempts where a transform is waited for [s]: nothing tells that one has come.
+#: Time between two attempts where what is waited for comes by transforms [s]: nothing tells that one has come.
 TRANSFORM_INTERVAL = 0.5
 
 
@@ -71,7 +71,7 @@ class GoalSession:
         self._waiting: tuple[PoseStamped, int] | None = None  # a newer goal, and its plan_id
         self._patience = self._timer(self._begin_waiting)  # runs meanwhile
         self._failure: Outcome | None = None  # of the last request, where something can cure it
-        self._retry_timer = self._timer(partial(self._retry, "transform"))  # runs while a transform can
+        self._retry_timer = self._timer(self._on_retry_timer)  # runs while a transform can
         self._progress: PathProgress | None = None  # along the path on display
         self._is_reached = False
         self._map_changed = False  # while it was planned again
@@ -103,7 +103,7 @@ class GoalSession:
 
     def start_came(self, start: Pose) -> None:
         """Follow the vehicle along the path on display, and try again what another start can cure."""
-        self._follow(start)
+        self._follow_to(start)
         self._retry("start")
 
     def map_came(self) -> None:
@@ -193,7 +193,7 @@ class GoalSession:
             with failures_reported(self._node, partial(self._conclude, request)):
                 self._conclude(request, outcome)
             self._begin_waiting()
-            for cure in request.came:
+            for cure in () if self.is_planning else request.came:
                 self._retry(cure)
             self._check_path()
             if self._map_changed:
@@ -221,8 +221,7 @@ class GoalSession:
         self._outputs.answer(outcome, last=last, plan_id=self._plan_id, revision=self._revision, map_id=self._readiness.map_id)
         path = outcome.plan and outcome.plan.path
         self._progress = PathProgress(path) if path else None
-        if self._readiness.start is not None:
-            self._follow(self._readiness.start)
+        self._follow()
 
     def _warn(self, status: Status, message: str) -> None:
         self._revision += 1
@@ -239,7 +238,7 @@ class GoalSession:
         if self._goal is not None and outcome.cure:
             self._failure = outcome
             self._warn(outcome.status, f"Waiting for a {outcome.cure}: the goal stands, and is planned again when one comes.")
-            if "transform" in outcome.cure:
+            if "transform" in outcome.cure or (self._frames.follows_vehicle and "start" in outcome.cure):
                 _restart(self._retry_timer, TRANSFORM_INTERVAL)
 
     def _forget_failure(self) -> None:
@@ -253,9 +252,22 @@ class GoalSession:
         elif self._failure is not None and cure in self._failure.cure:
             self._plan(_Purpose.RETRY)
 
+    def _on_retry_timer(self) -> None:
+        if not self.is_planning:
+            self._retry("")
+
     # The path on display
 
-    def _follow(self, start: Pose) -> None:
+    def _follow(self) -> None:
+        if self._progress is not None and (start := self._readiness.known_start()) is not None:
+            self._follow_to(start)
+
+    def _follow_frame(self) -> None:
+        """Follow the vehicle where its pose does not come by topic."""
+        if self._frames.follows_vehicle:
+            self._follow()
+
+    def _follow_to(self, start: Pose) -> None:
         if self._progress is None or self._outputs.shown is None:
             return
         self._progress.advance(start)
@@ -278,6 +290,7 @@ class GoalSession:
 
     def _check_path(self) -> None:
         """See whether what is left of the published path is free on the newest map; it is planned again, whether or not."""
+        self._follow_frame()
         progress = self._progress
         if progress is not None and not self._is_reached:
             self._path_check.begin(lambda: progress.ahead, lambda: self._awaited_request is None, self._on_checked)
@@ -296,6 +309,7 @@ class GoalSession:
 
     def _replan(self) -> None:
         """Plan again, from the newest start, where the goal is still pursued and nothing is under way."""
+        self._follow_frame()
         rate = self._parameters.read().node.replan_rate
         if self._goal is None or self._is_reached or not rate:
             self._replan_timer.cancel()

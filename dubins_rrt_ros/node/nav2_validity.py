@@ -53,7 +53,7 @@ class PathValidity:
     def _judged(self, path: Any) -> Future:
         """Return a future of the indices of poses that are not valid, or of what was raised."""
         found = Future()
-        self._worker.submit(partial(_judge, path, self._readiness.start, self._parameters.read().vehicle,
+        self._worker.submit(partial(_judge, path, self._readiness.known_start(), self._parameters.read().vehicle,
                                     self._maps.world_for_request()),
                             lambda outcome: self._queue.post(partial(found.set_result, outcome)))
         return found

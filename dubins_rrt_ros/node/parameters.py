@@ -38,6 +38,12 @@ class NodeOptions:
     publish_tree: bool = option(True, "publish the tree on ~/tree while somebody subscribes")
     publish: str = option("improvements", "paths of a request that are published: improvements, each better one; final, the last",
                           choices=("improvements", "final"))
+    robot_base_frame: str = option("", "frame of the vehicle, whose transform is the start when planning begins; empty: it comes "
+                                       "on start_pose or initialpose")
+    transform_tolerance: float = option(0.5, "how long a transform that is not there yet is waited for", unit="s", low=0.0,
+                                        high=60.0)
+    transform_max_age: float = option(1.0, "age beyond which the vehicle's transform is not taken", unit="s", low=0.0,
+                                      high=3600.0)
     replan_on_map_change: bool = option(False, "check what is left of the published path against every new map, and plan again")
     replan_rate: float = option(0.0, "how often the goal is planned again from the newest start, until it is reached; 0 is never",
                                 unit="Hz", low=0.0, high=100.0)

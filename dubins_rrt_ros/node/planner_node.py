@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -18,13 +18,14 @@ from .goal_session import GoalSession
 from .map_services import MapServices
 from .maps import Maps
 from .nav2 import Nav2
-from .outcome import failures_reported, outcome_of
+from .outcome import outcome_of
 from .outputs import Outputs
 from .parameters import Parameters
 from .path_check import PathCheck
 from .plan_service import PlanService
 from .qos import SERVICE, VOLATILE
 from .readiness import Readiness
+from .start_topics import StartTopics
 
 #: Time between two log lines on what is missing [s].
 REMINDER_INTERVAL = 5.0
@@ -45,9 +46,9 @@ class PlannerNode(Node):
         self._warn()
         self._queue = ExecutorQueue(self)
         self._outputs = Outputs(self, parameters, frame)
-        self._frames = Frames(self, frame)
+        self._frames = Frames(self, parameters, frame)
         self._maps = Maps(self, parameters, self._queue, self._on_map_news, self._on_map_prepared)
-        self._readiness = Readiness(self, parameters, self._maps, self._outputs)
+        self._readiness = Readiness(self, parameters, self._maps, self._outputs, self._frames)
         self._dispatcher = Dispatcher(self, parameters, self._maps, self._queue)
         self._path_check = PathCheck(self, parameters, self._maps, self._outputs, self._queue)
         self._session = GoalSession(self, parameters, self._dispatcher, self._readiness, self._frames, self._outputs,
@@ -69,8 +70,7 @@ class PlannerNode(Node):
             self.get_logger().info(f"Turning radius {vehicle.turning_radius:.4g} m, by wheelbase and max_steering_angle")
 
     def _listen(self) -> None:
-        self.create_subscription(PoseStamped, "start_pose", self._on_start, VOLATILE)
-        self.create_subscription(PoseWithCovarianceStamped, "initialpose", self._on_start, VOLATILE)
+        self._start_topics = StartTopics(self, self._readiness, self._frames, self._session.start_came)
         self.create_subscription(PoseStamped, "goal_pose", self._session.take, VOLATILE)
         # In the default group a service that awaits would keep everything else waiting.
         group = ReentrantCallbackGroup()
@@ -111,11 +111,6 @@ class PlannerNode(Node):
 
     def _on_reminder(self) -> None:
         self._readiness.remind(is_idle=not self._session.is_planning)
-
-    def _on_start(self, message: PoseStamped | PoseWithCovarianceStamped) -> None:
-        with failures_reported(self, self._readiness.refuse_start):
-            self._readiness.take_start(start := self._frames.pose("start", message))
-            self._session.start_came(start)
 
     async def _on_cancel(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         messages = [message] if (message := self._session.cancel()) else []

@@ -4,6 +4,7 @@ from rclpy.node import Node
 
 from dubins_rrt_ros.planning import Map, Pose, Status
 
+from .frames import Frames
 from .maps import Maps
 from .outcome import Outcome
 from .outputs import Outputs
@@ -21,11 +22,11 @@ class Readiness:
     """Keeps the start, knows whether map or start are missing, and reports that in log and status.
 
     Attributes:
-        start: where the vehicle is, in the global frame; None until a start has come that could be used and transformed.
+        start: the last one by topic, in the global frame; None until one has come that could be used and transformed.
     """
 
-    def __init__(self, node: Node, parameters: Parameters, maps: Maps, outputs: Outputs):
-        self._node, self._parameters, self._maps, self._outputs = node, parameters, maps, outputs
+    def __init__(self, node: Node, parameters: Parameters, maps: Maps, outputs: Outputs, frames: Frames):
+        self._node, self._parameters, self._maps, self._outputs, self._frames = node, parameters, maps, outputs, frames
         self.start: Pose | None = None
         self._start_refusal = ""  # why the last start was refused
         self._reported = ""  # what is missing, as it was logged last
@@ -45,15 +46,25 @@ class Readiness:
         return self._maps.map
 
     def require_start(self) -> Pose:
-        """Return the start; any thread may ask for it.
+        """Return where the vehicle is now, by its frame or by the last start; any thread may ask for it.
 
         Raises:
-            NotYet: there is none.
+            NotYet: it is not known.
+            Refusal: its frame is of no use.
         """
+        if self._frames.follows_vehicle:
+            return self._frames.vehicle()
         start = self.start
         if start is None:
             raise NotYet("a start", START_GRACE, self._no_start)
         return start
+
+    def known_start(self) -> Pose | None:
+        """Return the same, and None where it is not known."""
+        try:
+            return self.require_start()
+        except (NotYet, Refusal):
+            return None
 
     def _no_start(self) -> Refusal:
         return Refusal(Status.NO_START, f"There is no start to plan from: {self._remedy_for_start()}")
@@ -147,7 +158,8 @@ class Readiness:
         """Return a sentence on what is missing, "" where nothing is."""
         if self._maps.map is None:
             return self.missing_map()
-        return f"Waiting for a start: {self._remedy_for_start()}" if self.start is None else ""
+        has_start = self.start is not None or self._frames.follows_vehicle
+        return "" if has_start else f"Waiting for a start: {self._remedy_for_start()}"
 
     def _log(self) -> None:
         if self._maps.map is None:

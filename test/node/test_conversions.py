@@ -27,6 +27,7 @@ from dubins_rrt_ros.node.conversions import (
     path_message,
     pose_from,
     pose_message,
+    rigid_from,
     status_message,
     transformed,
 )
@@ -95,7 +96,7 @@ def test_a_transformed_pose_is_rotated_then_translated(over_the_wire, seed):
     at, by = draw.normal(scale=100.0, size=(2, 3))
     transform = Transform(translation=Vector3(**dict(zip("xyz", by.tolist(), strict=True))), rotation=quaternion(turn))
     pose = PoseMessage(position=Point(**dict(zip("xyz", at.tolist(), strict=True))), orientation=quaternion(facing))
-    there = over_the_wire(transformed(over_the_wire(pose), over_the_wire(transform)))
+    there = over_the_wire(transformed(over_the_wire(pose), rigid_from(over_the_wire(transform))))
     assert numbers(there.position, "xyz") == pytest.approx(turn.apply(at) + by, abs=1e-11)
     found = Rotation.from_quat(numbers(there.orientation, "xyzw"))
     assert (found * (turn * facing).inv()).magnitude() < 1e-14
@@ -103,12 +104,12 @@ def test_a_transformed_pose_is_rotated_then_translated(over_the_wire, seed):
 
 def test_a_pose_is_not_changed_by_no_transform():
     pose = stamped(x=3.0, y=-4.0, z=5.0, q=(0.0, 0.0, 0.6, 0.8)).pose
-    assert transformed(pose, Transform()) == pose
+    assert transformed(pose, rigid_from(Transform())) == pose
 
 
 def test_a_transform_in_the_plane_adds_its_yaw():
     transform = Transform(translation=Vector3(x=1.0, y=2.0, z=0.0), rotation=quaternion(Rotation.from_euler("z", math.pi / 2)))
-    there = transformed(pose_message((3.0, 0.5, 2.0)), transform)
+    there = transformed(pose_message((3.0, 0.5, 2.0)), rigid_from(transform))
     assert pose_from("goal", there) == pytest.approx((0.5, 5.0, 2.0 + math.pi / 2 - 2 * math.pi), abs=1e-12)
 
 
@@ -117,7 +118,7 @@ def test_what_is_wrong_with_a_pose_is_still_wrong_in_another_frame():
     for message, reason in ((stamped(x=NAN), "finite"), (stamped(q=(0.0, 0.0, 0.0, 9e-4)), "norm is 0.0009"),
                             (stamped(q=(0.0, 0.5**0.5, 0.0, 0.5**0.5)), "x axis is vertical")):
         with pytest.raises(InvalidPose, match=reason):
-            pose_from("goal", transformed(message.pose, transform))
+            pose_from("goal", transformed(message.pose, rigid_from(transform)))
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.99, 2.0, 1e-2, 1e100])
@@ -133,7 +134,7 @@ def test_the_yaw_of_a_pose_that_leans_is_taken_after_a_transform_too():
     transform = Transform(rotation=quaternion(Rotation.from_euler("xyz", (0.3, -0.2, 1.0))))
     pose = PoseMessage(orientation=quaternion(Rotation.from_euler("zyx", (0.5, 0.1, 0.2))))
     x, y, _ = (Rotation.from_euler("xyz", (0.3, -0.2, 1.0)) * Rotation.from_euler("zyx", (0.5, 0.1, 0.2))).apply((1, 0, 0))
-    assert pose_from("goal", transformed(pose, transform))[2] == pytest.approx(math.atan2(y, x), abs=1e-14)
+    assert pose_from("goal", transformed(pose, rigid_from(transform)))[2] == pytest.approx(math.atan2(y, x), abs=1e-14)
 
 
 @pytest.mark.parametrize(("degrees", "taken"), [(0.5, True), (89.0 - 1e-6, True), (89.0 + 1e-6, False), (90.0, False)])

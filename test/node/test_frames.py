@@ -17,7 +17,8 @@ from support.yard import GOAL, QUICK, START
 from dubins_rrt_ros.node.conversions import pose_message
 from dubins_rrt_ros.planning import GridMap, save_map
 
-without_tf2 = pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2_ros is installed")
+HAS_TF = any(importlib.util.find_spec(name) for name in ("tf2_ros", "tf2_msgs"))
+without_tf2 = pytest.mark.skipif(HAS_TF, reason="tf2_ros or tf2_msgs is installed")
 
 
 def stamped(pose, frame):

@@ -255,6 +255,7 @@ class Conversation:
     def __init__(self, process: NodeProcess, client: Client):
         self.process, self.client = process, client
         self.asked = 0
+        self._goal = None  # that was sent last
 
     def start(self, pose, topic: str = "start_pose") -> None:
         """Send a start that the next goal finds, though topics keep no common order: without any, a goal waits for it."""
@@ -274,7 +275,12 @@ class Conversation:
         return self.client.status_of(0, error_name=name)
 
     def goal(self, pose, frame: str = "map", **wanted: str) -> dict[str, str]:
-        """The status of a goal, the first that has the wanted values."""
+        """The status of a goal, the first that has the wanted values. The same goal again is planned anew."""
+        from std_srvs.srv import Trigger
+
+        if pose == self._goal:
+            self.client.call(Trigger, "cancel")  # while it is planned, the same would not disturb it
+        self._goal = pose
         self.asked += 1
         self.client.statuses.clear()
         self.client.send("goal_pose", pose, frame)
