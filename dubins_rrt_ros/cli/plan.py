@@ -6,14 +6,14 @@ import math
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from types import FrameType
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan, plan_through
-from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
-from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
+from dubins_rrt_ros.planning.problem import DoubtfulYaw, Waypoint, checked_waypoint, doubt_about_yaw
 from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.example import ENDS, EXAMPLE, MAP
@@ -102,6 +102,7 @@ def _request(arguments: argparse.Namespace) -> LoadedRequest:
 
 
 def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
+    warnings.simplefilter("ignore", DoubtfulYaw)  # which `_pose` says, with the flag
     given = given_options(arguments, Vehicle)
     for name, by in overridden(given).items():
         print(f"dubins_rrt plan: warning: {flag(name)} has no effect, as {flag(by)} takes its place", file=sys.stderr)
@@ -126,9 +127,8 @@ def _pose(arguments: argparse.Namespace, name: str, numbers: Sequence[float]) ->
     x, y, yaw = numbers
     if "degrees" in arguments:
         return [x, y, math.radians(yaw)]
-    if 2 * math.pi < abs(yaw) <= LARGEST_YAW:
-        print(f"dubins_rrt plan: warning: the yaw of {flag(name)} is {yaw:g} rad; did you mean {math.radians(yaw):.5g}? "
-              "--degrees takes degrees", file=sys.stderr)
+    if doubt := doubt_about_yaw((x, y, yaw)):
+        print(f"dubins_rrt plan: warning: {flag(name)} has {doubt} --degrees takes degrees", file=sys.stderr)
     return [x, y, yaw]
 
 

@@ -1,6 +1,7 @@
 """The request to the planner: map, vehicle, start, goal and what counts as reaching the goal."""
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -19,6 +20,10 @@ Waypoint = tuple[float, float, float | None]
 
 class InvalidPose(PlanningError, ValueError):
     """A pose that is none; the message says which and why."""
+
+
+class DoubtfulYaw(UserWarning):
+    """A warning: a yaw beyond a full turn, which is taken, but was likely meant in degrees."""
 
 
 class PreparedMap(Protocol):
@@ -84,6 +89,9 @@ class Problem:
         for name, value in given.items():
             object.__setattr__(self, name, value)
         convert_options(self)
+        for name, pose in (("start", self.start), ("goal", self.goal)):
+            if doubt := doubt_about_yaw(pose):
+                warnings.warn(f"the {name} pose has {doubt}", DoubtfulYaw, stacklevel=2)
 
     @property
     def yaw_tolerance(self) -> float:
@@ -101,6 +109,12 @@ def _check_fit(world: PreparedMap, vehicle: Vehicle | None, allow_unknown: bool)
         raise OptionError("the world is prepared for another vehicle; leave the vehicle out, or give world.for_vehicle(vehicle)")
     if allow_unknown and not world.allow_unknown:
         raise OptionError("allow_unknown is true, but the world is prepared without it; prepare one with allow_unknown=True")
+
+
+def doubt_about_yaw(pose: Pose) -> str:
+    """Return what is doubtful about a pose's yaw, in words; "" where nothing is."""
+    yaw = pose[2]
+    return f"the yaw {yaw:g} rad; did you mean {math.radians(yaw):.5g}?" if math.tau < abs(yaw) <= LARGEST_YAW else ""
 
 
 def checked_pose(name: str, pose: Sequence[float]) -> Pose:

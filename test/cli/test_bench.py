@@ -55,6 +55,17 @@ def refusal(*argv, capsys):
     return error
 
 
+def test_what_is_overridden_or_in_degrees_is_told_once():
+    footprint = "[[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]"
+    file = problems(entry(footprint=footprint), entry(name="other", footprint=footprint, start=[-4.0, -3.0, 90.0]))
+    command = [sys.executable, "-m", "dubins_rrt_ros", "bench", file, "--planner", "rrt", "--seeds", "2", "--out", "runs.jsonl"]
+    done = subprocess.run([*command, *BUDGET], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if "warning" in line] == [
+        f"dubins_rrt bench: warning: {file}: robot_radius has no effect, as footprint takes its place, in 2 problems",
+        f"dubins_rrt bench: warning: {file}: problem other: its start has the yaw 90 rad; did you mean 1.5708?"]
+
+
 def test_a_line_tells_what_plan_does(capsys):
     block = entry(name="block", map=str(maps_directory() / "block.yaml"), start=[2, 3, 1.57], goal=[6, 4, 0], turning_radius=0.5)
     lines = bench(problems(entry(), block), "--seeds", "2", *BUDGET, "--goal-bias", "0.2", "--heading-sampling", "goal")

@@ -57,7 +57,7 @@ def test_a_yaw_beyond_a_full_turn_is_doubted_and_degrees_can_be_given(hall, caps
     at = ["--start", "-4", "-3", "90", "--goal", "3.5", "-3", "-90"]
     status, _, error = run(hall, *at, *BUDGET, capsys=capsys)
     assert status == 0 and error.splitlines() == [
-        f"dubins_rrt plan: warning: the yaw of --{name} is {yaw} rad; did you mean {meant}? --degrees takes degrees"
+        f"dubins_rrt plan: warning: --{name} has the yaw {yaw} rad; did you mean {meant}? --degrees takes degrees"
         for name, yaw, meant in (("start", "90", "1.5708"), ("goal", "-90", "-1.5708"))]
     status, out, error = run(hall, *at, "--degrees", *BUDGET, "--json", "-", capsys=capsys)
     assert status == 0 and "warning" not in error

@@ -162,6 +162,12 @@ def test_poses_become_floats():
     assert checked_pose("start", (1, 2, 3)) == (1.0, 2.0, 3.0)
 
 
+def test_a_yaw_that_was_likely_meant_in_degrees_is_doubted():
+    with pytest.warns(UserWarning, match="^the goal pose has the yaw 90 rad; did you mean 1.5708?") as warned:
+        problem = Problem(MAP, Vehicle(), (1, 1, 2 * math.pi), (2, 2, 90))
+    assert problem.goal == (2.0, 2.0, 90.0) and len(warned) == 1 and warned[0].filename == __file__
+
+
 def test_what_counts_as_an_exact_goal():
     make = MAKE[Problem]
     assert make().exact_goal

@@ -1,13 +1,16 @@
 """The problems of `dubins_rrt bench`, read from its file and checked before the first run."""
 
 import os
+import warnings
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Problem, Settings, Vehicle, checked_pose, options
+from dubins_rrt_ros.planning.problem import doubt_about_yaw
 from dubins_rrt_ros.planning.text import one_line, quoted
+from dubins_rrt_ros.planning.vehicle import overridden
 
 from ..common.documents import read_json
 from ..common.parser import UsageError, near_miss
@@ -19,6 +22,10 @@ _IN_PLACE_OF = {"turning_radius": "wheelbase", "robot_radius": "footprint"}
 NOTES = ("set", "check_step")
 
 _Options = tuple[tuple[str, Any], ...]
+
+
+class DoubtfulProblem(UserWarning):
+    """A warning: what a file of problems says is taken, but was likely meant otherwise."""
 
 
 class Case(NamedTuple):
@@ -56,10 +63,23 @@ def read_cases(file: str) -> list[Case]:
     if not (isinstance(entries, list) and entries):
         raise UsageError(f"{file} is no list of problems; give [{{\"name\": ..., \"map\": ..., ...}}, ...]")
     cases = [_case(entry, Path(file).parent, f"{file}: problem {number}") for number, entry in enumerate(entries, 1)]
+    for doubt in _doubts(entries, cases):
+        warnings.warn(one_line(f"{file}: {doubt}"), DoubtfulProblem, stacklevel=2)
     twice = [name for name, count in Counter(case.name for case in cases).items() if count > 1]
     if twice:
         raise UsageError(one_line(f"{file}: several problems have the name {twice[0]}; give each its own"))
     return cases
+
+
+def _doubts(entries: list[dict[str, Any]], cases: list[Case]) -> Iterator[str]:
+    """Say of which keys nothing comes, as others take their place, and which yaws were likely meant in degrees."""
+    counts = Counter(item for entry in entries for item in overridden(entry).items())
+    for (name, by), count in counts.items():
+        yield f"{name} has no effect, as {by} takes its place, in {count} problem{'' if count == 1 else 's'}"
+    for case in cases:
+        for name, pose in (("start", case.start), ("goal", case.goal)):
+            if doubt := doubt_about_yaw(pose):
+                yield f"problem {case.name}: its {name} has {doubt}"
 
 
 def chosen(cases: list[Case], names: Collection[str]) -> list[Case]:

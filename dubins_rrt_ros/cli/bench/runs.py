@@ -2,6 +2,7 @@
 
 import signal
 import time
+import warnings
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, Vehicle, World, load_map, plan, prepare
+from dubins_rrt_ros.planning.problem import DoubtfulYaw
 
 from ..common.parser import UsageError
 from .problems import Case
@@ -66,6 +68,7 @@ def measure(run: BenchRun) -> dict[str, Any]:
         MapError: the map cannot be used.
     """
     case = run.case
+    warnings.simplefilter("ignore", DoubtfulYaw)  # which was said when the problems were read
     world, map_time = _loaded(case.map, case.vehicle, case.allow_unknown)
     problem = Problem(world, start=case.start, goal=case.goal, **dict(case.request))
     trace: list[list[float]] = []
