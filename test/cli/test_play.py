@@ -185,6 +185,7 @@ def test_where_there_is_no_path_the_reason_and_its_place_are_told(server):
 @pytest.mark.parametrize("text, words", [
     ("no JSON", "Expecting"), ("[]", "no object"), ('{"type": "format"}', "format"), ("[" * 100_000, "recursion"),
     ('{"type": "plan", "start": [0, 0]}', "start pose"),
+    ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "via": [[1]]}', "waypoint 1"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 2, NaN]}', "goal pose"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "vehicle": {"wings": 2}}', "wings"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "settings": {"samples": -1}}', "samples"),
@@ -244,9 +245,10 @@ def test_an_edited_map_plans_as_one_that_is_prepared_anew(tmp_path):
     assert edited.path == plan(Problem(bench.map, Vehicle(), START, GOAL), settings).path
 
 
-def test_what_is_copied_plans_the_same(server, capsys, monkeypatch, tmp_path):
+@pytest.mark.parametrize("via", [[], [[4.5, 5.0], [10.0, 7.5, 0.3]]])
+def test_what_is_copied_plans_the_same(server, via, capsys, monkeypatch, tmp_path):
     async def copied(page):
-        await page.plan(1, vehicle={"turning_radius": 1.2}, problem={"any_goal_heading": True}, settings={
+        await page.plan(1, via=via, vehicle={"turning_radius": 1.2}, problem={"any_goal_heading": True}, settings={
             "seed": 3, "samples": 50, "planning_time": 30.0, "shortcut": False})
         answer, texts = (await page.final(1))[0], {}
         for kind in ("command", "Python", "JSON"):

@@ -176,6 +176,20 @@ def test_a_wall_is_drawn_with_the_mouse_and_erased(page):
     page.wait_for("a short path", lambda: page.answer()["final"] and (page.answer()["length"] or 99) < before + 0.1)
 
 
+def test_waypoints_are_set_dragged_and_removed(page):
+    before = page.answer()["length"]
+    page.find("[data-tool=via]").click()
+    place = page.on_screen(13.5, 2.0)
+    page.drag(place, place)
+    page.wait_for("a path over the waypoint", lambda: page.answer()["final"] and (page.answer()["length"] or 0) > before + 3)
+    assert min(math.dist(pose[:2], (13.5, 2.0)) for pose in page.path()) < 0.1
+    page.drag(place, page.on_screen(13.0, 2.5))
+    page.wait_for("a path over it there", lambda: page.answer()["final"] and not page.answer()["quick"] and page.path()
+                  and min(math.dist(pose[:2], (13.0, 2.5)) for pose in page.path()) < 0.1)
+    page.drag(page.on_screen(13.0, 2.5), page.on_screen(13.0, 2.5))
+    page.wait_for("the path without", lambda: page.answer()["final"] and (page.answer()["length"] or 99) < before + 0.1)
+
+
 def test_the_vehicle_is_changed_by_sliders(page):
     before = page.answer()["length"]
     page.set("#turning_radius", 1.5)

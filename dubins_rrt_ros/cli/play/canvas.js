@@ -1,7 +1,7 @@
 // The picture: map, tree, paths, vehicle, start and goal. Positions are in metres; the y axis points up.
 
 const COLOURS = { free: "#ffffff", obstacle: "#454b54", tree: "#7fa9d1", path: "#d55e00", first: "#8a4b08", start: "#009e73",
-                  goal: "#0072b2", cause: "#e69f00", swept: "#d55e0026" };
+                  goal: "#0072b2", via: "#7b3294", cause: "#e69f00", swept: "#d55e0026" };
 const HANDLE = 34;  // length of the arrows that turn start and goal [pixel]
 const NEAR = 16;    // distance within which a handle is taken [pixel]
 
@@ -12,6 +12,7 @@ export class View {
     this.map = null;
     this.start = [0, 0, 0];
     this.goal = [0, 0, 0];
+    this.via = [];
     this.selected = "goal";
     this.answer = null;
     this.first = null;
@@ -86,6 +87,11 @@ export class View {
     return this.vehicle.footprint.length ? Math.max(...this.vehicle.footprint.map((corner) => corner[0])) : this.vehicle.radius;
   }
 
+  // The number of the waypoint at a place on the screen, or -1.
+  pickWaypoint(x, y) {
+    return this.via.findIndex((point) => Math.hypot(...minus(this.toScreen(...point), [x, y])) < NEAR);
+  }
+
   // What is at a place on the screen: [name, part], or null.
   pick(x, y) {
     let best = null, least = Infinity;
@@ -127,6 +133,7 @@ export class View {
     this.drawStroke();
     this.drawTree();
     this.drawPaths();
+    this.drawWaypoints();
     this.drawPose(this.start, COLOURS.start, "start");
     this.drawPose(this.goal, COLOURS.goal, "goal");
     this.drawCause();
@@ -208,6 +215,16 @@ export class View {
     const cos = Math.cos(theta), sin = Math.sin(theta);
     for (const [ahead, left] of footprint) { context.lineTo(x + ahead * cos - left * sin, y + ahead * sin + left * cos); }
     context.closePath();
+  }
+
+  drawWaypoints() {
+    this.via.forEach(([x, y], i) => {
+      this.context.beginPath();
+      this.context.arc(x, y, 8 * this.pixel, 0, 2 * Math.PI);
+      this.context.fillStyle = COLOURS.via;
+      this.context.fill();
+      this.write(String(i + 1), x, y, COLOURS.via);
+    });
   }
 
   drawPose(pose, colour, name) {

@@ -13,6 +13,7 @@ from PIL import Image
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Pose, Problem, Settings, Vehicle, checked_pose, options, values
 from dubins_rrt_ros.planning.option import Option, OptionError
+from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
 
 from ..common.example import GOAL, START
 from ..common.flags import flag
@@ -31,6 +32,7 @@ class PlanRequest(NamedTuple):
     Attributes:
         id: the number that the answers to it have.
         start, goal: (x [m], y [m], theta [rad]).
+        via: the waypoints between them, in order, as `plan_through` takes them.
         vehicle, settings: as the library has them.
         problem: the options of the problem by name.
         is_quick: True while the mouse drags something: then the first path that is shortened and audited ends the search.
@@ -39,6 +41,7 @@ class PlanRequest(NamedTuple):
     id: int
     start: Pose
     goal: Pose
+    via: tuple[Waypoint, ...]
     vehicle: Vehicle
     settings: Settings
     problem: dict[str, Any]
@@ -55,8 +58,10 @@ def read_request(document: Mapping[str, Any]) -> PlanRequest:
     settings = Settings(**_known(Settings, document.get("settings")))
     problem = _known(Problem, document.get("problem"))
     number = document.get("id")
-    return PlanRequest(number if isinstance(number, int) else 0, checked_pose("start", document.get("start", ())),
-                       checked_pose("goal", document.get("goal", ())), vehicle, settings, problem, document.get("quick") is True)
+    start, goal = (checked_pose(name, document.get(name, ())) for name in ("start", "goal"))
+    via = tuple(checked_waypoint(f"waypoint {count}", pose) for count, pose in enumerate(document.get("via", ()), 1))
+    return PlanRequest(number if isinstance(number, int) else 0, start, goal, via, vehicle, settings, problem,
+                       document.get("quick") is True)
 
 
 def _known(cls: type, given: Any) -> dict[str, Any]:
@@ -162,6 +167,8 @@ def _finite(value: float | None) -> float | None:
 def as_command(request: PlanRequest, map_name: str) -> str:
     """Return the command line that plans a request."""
     words = ["dubins_rrt", "plan", map_name, "--start", *map(repr, request.start), "--goal", *map(repr, request.goal)]
+    for waypoint in request.via:
+        words += ["--via", *(repr(number) for number in waypoint if number is not None)]
     for name, value in _given(request).items():
         words += [flag(name if value is not False else f"no_{name}"), *([] if isinstance(value, bool) else [str(value)])]
     return shlex.join(words)
@@ -172,10 +179,11 @@ def as_python(request: PlanRequest, map_name: str) -> str:
     parts = {"Vehicle": _differing(request.vehicle), "Problem": request.problem, "Settings": _differing(request.settings)}
     keywords = {name: ", ".join(f"{key}={value!r}" for key, value in given.items()) for name, given in parts.items()}
     more = f", {keywords['Problem']}" if keywords["Problem"] else ""
-    return ("from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan\n\n"
+    verb, waypoints = ("plan_through", f"{list(request.via)!r}, ") if request.via else ("plan", "")
+    return (f"from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, {verb}\n\n"
             f"problem = Problem(load_map({map_name!r}), Vehicle({keywords['Vehicle']}),\n"
             f"                  start={request.start!r}, goal={request.goal!r}{more})\n"
-            f"result = plan(problem, Settings({keywords['Settings']}))\n"
+            f"result = {verb}(problem, {waypoints}Settings({keywords['Settings']}))\n"
             "print(result.message)\n")
 
 

@@ -40,7 +40,7 @@ function ask(quick) {
 
 function flush() {
   if (!dirty || !options || sent.size >= MOST_WAITING) { return; }
-  const message = { type: "plan", id: ++number, start: view.start, goal: view.goal, quick: dirty.quick, ...chosen() };
+  const message = { type: "plan", id: ++number, start: view.start, goal: view.goal, via: view.via, quick: dirty.quick, ...chosen() };
   if (send(message)) { sent.set(number, performance.now()); dirty = null; }
 }
 
@@ -70,6 +70,7 @@ const receivers = {
     $("title").textContent = message.name;
     if (message.new) {
       [view.start, view.goal] = known && known.map === message.name ? [known.start, known.goal] : [message.start, message.goal];
+      view.via = known && known.map === message.name && known.via ? known.via : [];
       view.answer = view.first = view.tree = null;
       view.fit();
     }
@@ -202,7 +203,7 @@ for (const button of document.querySelectorAll("[data-tool]")) {
   button.onclick = () => {
     tool = button.dataset.tool;
     for (const other of document.querySelectorAll("[data-tool]")) { other.setAttribute("aria-pressed", String(other === button)); }
-    $("brushes").hidden = tool === "move";
+    $("brushes").hidden = !["draw", "erase"].includes(tool);
   };
 }
 $("drive").onclick = () => view.drive();
@@ -216,6 +217,12 @@ $("canvas").onpointerdown = (event) => {
   $("canvas").setPointerCapture(event.pointerId);
   const [x, y] = place(event);
   if (event.button !== 0) { held = { kind: "pan", x, y }; return; }
+  if (tool === "via") {
+    const number = view.pickWaypoint(x, y);
+    held = { kind: "via", number, isNew: number < 0, x, y };
+    if (number < 0) { view.via.push(view.toWorld(x, y)); held.number = view.via.length - 1; ask(true); view.request(); }
+    return;
+  }
   if (tool !== "move") {
     held = { kind: "stroke" };
     view.stroke = { points: [view.toWorld(x, y)], obstacle: tool === "draw", radius: Number($("brush").value), from: 0, last: 0 };
@@ -236,12 +243,18 @@ $("canvas").onpointermove = (event) => {
   const [x, y] = place(event), [wx, wy] = view.toWorld(x, y);
   if (held.kind === "pan") { view.pan(x - held.x, y - held.y); [held.x, held.y] = [x, y]; return; }
   if (held.kind === "stroke") { view.stroke.points.push([wx, wy]); sendStroke(false); view.request(); return; }
+  if (held.kind === "via") {
+    held.moved = held.moved || Math.hypot(x - held.x, y - held.y) > 4;
+    if (held.moved) { view.via[held.number] = [wx, wy]; view.request(); ask(true); }
+    return;
+  }
   const pose = view[held.name];
   if (held.kind === "move") { setPose(held.name, [wx + held.offset[0], wy + held.offset[1], pose[2]]); return; }
   if (Math.hypot(wx - pose[0], wy - pose[1]) * view.scale > 6) { setPose(held.name, [pose[0], pose[1], Math.atan2(wy - pose[1], wx - pose[0])]); }
 };
 
 $("canvas").onpointerup = $("canvas").onpointercancel = () => {
+  if (held && held.kind === "via" && !held.isNew && !held.moved) { view.via.splice(held.number, 1); view.request(); }
   if (held && held.kind === "stroke") { sendStroke(true); } else if (held && held.kind !== "pan") { ask(false); }
   held = null;
 };
@@ -285,7 +298,7 @@ $("canvas").onkeydown = (event) => {
 
 function remember() {
   const form = Object.fromEntries(["turning_radius", "shape", "robot_radius", "ahead", "behind", "width"].map((id) => [id, $(id).value]));
-  if (view.map) { sessionStorage.setItem(STORE, JSON.stringify({ map: view.map.name, start: view.start, goal: view.goal, form, changed })); }
+  if (view.map) { sessionStorage.setItem(STORE, JSON.stringify({ map: view.map.name, start: view.start, goal: view.goal, via: view.via, form, changed })); }
 }
 
 function recall() {

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from dubins_rrt_ros.planning import Plan, PlanningError, Problem, Progress, plan
+from dubins_rrt_ros.planning import Plan, PlanningError, Problem, Progress, plan, plan_through
 from dubins_rrt_ros.planning.plan_file import to_document
 
 from ..common.output import finite
@@ -162,7 +162,8 @@ class Session:
         settings = request.settings
         if request.is_quick:
             settings = replace(settings, planner="rrt", planning_time=min(QUICK_LIMIT, settings.planning_time))
-        answer = plan(problem, settings, cancel=is_superseded, on_progress=show)
+        follow: dict[str, Any] = {"cancel": is_superseded, "on_progress": show}
+        answer = plan_through(problem, request.via, settings, **follow) if request.via else plan(problem, settings, **follow)
         self._last = request, answer
         self._show(request, answer, True, *first[:1])
 
