@@ -194,6 +194,8 @@ def _report(answer: Plan, request: LoadedRequest, out: TextIO) -> None:
     if answer.path is None:
         print(f"{int(answer.status)} {answer.status.name}: {answer.message}", file=sys.stderr)
         return
+    if answer.start_too_near:
+        print("dubins_rrt plan: warning: the start is nearer to an obstacle than allowed; start_slack lets it", file=sys.stderr)
     print(*filter(None, [answer.message, _more_figures(answer), _derived_figures(answer.problem.vehicle)]), file=out)
     if request.path is not None and request.path != answer.path:
         print(f"dubins_rrt plan: the path is not the one of {request.source}, which another version may have planned",

@@ -287,7 +287,7 @@ def _level(status: Status, plan: Plan | None, plan_id: int) -> bytes:
         return DiagnosticStatus.OK
     compared = 2 if plan.problem.any_goal_heading else 3
     approximate = not plan.problem.exact_goal and plan.path.end[:compared] != plan.problem.goal[:compared]
-    return DiagnosticStatus.WARN if approximate or plan.cancelled else DiagnosticStatus.OK
+    return DiagnosticStatus.WARN if approximate or plan.cancelled or plan.start_too_near else DiagnosticStatus.OK
 
 
 def _yaw(what: str, q: Quaternion, error: type[ValueError]) -> float:

@@ -26,12 +26,13 @@ class Deadline:
 
     Attributes:
         reserve: time before the limit that is kept for what follows the search [s].
+        cancel: tells whether the request is cancelled; for the thread of the request.
         cancelled: True once `poll` saw the request cancelled.
     """
 
     def __init__(self, limit: float, cancel: Callable[[], bool]):
         """Start the clock, for `limit` seconds."""
-        self._limit, self._cancel = limit, cancel
+        self._limit, self.cancel = limit, cancel
         self._cancelled_at = 0.0
         self.reserve = 0.0
         self.cancelled = False
@@ -63,7 +64,7 @@ class Deadline:
 
     def poll(self) -> bool:
         """Return `is_over`, after a look at the cancellation; for the thread of the request."""
-        if not self.cancelled and self._cancel():
+        if not self.cancelled and self.cancel():
             self.cancelled, self._cancelled_at = True, self.elapsed
         return self.is_over
 

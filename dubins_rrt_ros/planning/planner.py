@@ -15,6 +15,7 @@ from .collision.clearance import ClearanceField
 from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
+from .departure import find_departure
 from .diagnosis import explain
 from .problem import Problem
 from .result import Plan, Progress, Status, gap_above, reaches_goal
@@ -25,7 +26,7 @@ from .search.known_path import KnownPath
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
-from .settings import Settings
+from .settings import MIN_PLANNING_TIME, Settings
 from .world import World, prepare
 
 #: Maximum time between two reports of progress [s].
@@ -147,11 +148,27 @@ class _Call:
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
         if diagnosis := explain.before_search(self._problem, field):
+            if diagnosis.status == Status.START_OCCUPIED and self._problem.start_slack > 0:
+                return self._leave_start(field, diagnosis.message)
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
         if reaches_goal(self._problem.start, self._problem, rounding=SAME):
             self._time_to_found = self._elapsed
             return self._answer_with(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
+
+    def _leave_start(self, field: ClearanceField, occupied: str) -> Plan:
+        """Return the plan from a start that is too near to an obstacle, or why there is none."""
+        problem = self._problem
+        departure = find_departure(problem, field, occupied, self._deadline.check)
+        if self._deadline.cancelled:
+            return self._cancelled(self._root, 0)
+        if departure.path is None:
+            return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
+        settings = replace(self._settings, planning_time=max(MIN_PLANNING_TIME, self._deadline.left))
+        found = plan(departure.rest(problem), settings, cancel=self._deadline.cancel, seed_path=self._seed_path,
+                     on_progress=lambda report: self._on_progress(departure.progress(report, problem)),
+                     report_samples=self._report_samples)
+        return replace(departure.joined(found, problem), settings=self._settings, map_time=self._map_time)
 
     def _is_cancelled(self) -> bool:
         self._deadline.poll()

@@ -68,12 +68,14 @@ class Problem:
                                        unit="rad", low=0.0, high=math.pi)
     any_goal_heading: bool = option(False, "accept any heading at the goal")
     allow_unknown: bool = option(False, "treat unknown space as free")
+    start_slack: float = option(0.0, "how much nearer than allowed to an obstacle the vehicle may stand at its start, if it can "
+                                "leave without coming any nearer", unit="m", low=0.0, high=1000.0)
     world: PreparedMap | None = field(default=None, repr=False)
 
     def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None,  # noqa: A002 - a public name
                  start: Sequence[float] = (), goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0,
                  goal_tolerance_yaw: float = 0.0, any_goal_heading: bool = False, allow_unknown: bool = False,
-                 world: PreparedMap | None = None):
+                 start_slack: float = 0.0, world: PreparedMap | None = None):
         """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
         if not isinstance(map, GridMap | PolygonMap):
             _check_fit(map, vehicle, allow_unknown)
@@ -85,7 +87,8 @@ class Problem:
             world = None
         given = {"map": map, "vehicle": vehicle, "start": checked_pose("start", start), "goal": checked_pose("goal", goal),
                  "goal_tolerance_xy": goal_tolerance_xy, "goal_tolerance_yaw": goal_tolerance_yaw,
-                 "any_goal_heading": any_goal_heading, "allow_unknown": allow_unknown, "world": world}
+                 "any_goal_heading": any_goal_heading, "allow_unknown": allow_unknown,
+                 "start_slack": start_slack, "world": world}
         for name, value in given.items():
             object.__setattr__(self, name, value)
         convert_options(self)

@@ -72,6 +72,7 @@ class Plan(Plottable):
         found_by: what found the path, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one, and
             where nothing had to be searched.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
+        start_too_near: True if the path leaves a start that is nearer to an obstacle than allowed, as `start_slack` says.
         waypoints: the waypoints that the path was to pass, as they were asked for.
         waypoint_indices: index among `poses` of each waypoint; empty without a path.
     """
@@ -94,6 +95,7 @@ class Plan(Plottable):
     cost_lower_bound: float = 0.0
     found_by: str = ""
     audit: Audit | None = None
+    start_too_near: bool = False
     waypoints: tuple[Waypoint, ...] = ()
     waypoint_indices: tuple[int, ...] = ()
 

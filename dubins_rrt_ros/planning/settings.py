@@ -8,6 +8,8 @@ from .vehicle import Vehicle
 
 #: Maximum planning_time [s].
 MAX_PLANNING_TIME = 3600.0
+#: Minimum planning_time [s].
+MIN_PLANNING_TIME = 0.001
 #: Minimum path_spacing, where it is not 0 [m].
 MIN_SPACING = 0.001
 #: The options of the paper's plain algorithms.
@@ -27,7 +29,7 @@ class Settings:
                           choices=("rrt", "rrt_star"))
     samples: int = option(3000, "number of samples after which a search that has a path ends; the maximum with informed: false",
                           low=1, high=10_000_000)
-    planning_time: float = option(1.0, "time limit", unit="s", low=0.001, high=MAX_PLANNING_TIME)
+    planning_time: float = option(1.0, "time limit", unit="s", low=MIN_PLANNING_TIME, high=MAX_PLANNING_TIME)
     goal_bias: float = option(0.05, "share of the samples drawn at the goal", low=0.0, high=1.0)
     step_size: float = option(0.0, "maximum length of an edge, also when rewired; 0 is unlimited", unit="m", low=0.0, high=1e6)
     heading_sampling: str = option(

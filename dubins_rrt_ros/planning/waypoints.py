@@ -20,6 +20,7 @@ from .curves import dubins
 from .curves.angles import heading_error, position_error, wrap
 from .curves.path import Path
 from .deadline import Deadline, never
+from .departure import find_departure
 from .planner import SAME, plan, with_seed
 from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
@@ -30,7 +31,7 @@ from .search.known_path import KnownPath
 from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
-from .settings import Settings
+from .settings import MIN_PLANNING_TIME, Settings
 from .world import World, prepare
 
 #: Number of headings that are tried at a waypoint.
@@ -106,6 +107,8 @@ class _Call:
         stops = list(_stops(self._problem, self._waypoints))
         if len(stops) < 3:
             return self._single_leg(stops)
+        if not self._world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
+            return self._leave_start(stops)
         if unreachable := self._without_room(stops):
             return unreachable
         legs = [self._leg(here, there) for here, there in pairwise(stops)]
@@ -126,6 +129,23 @@ class _Call:
         ends = (0, len(answer.poses()) - 1)
         indices = [end for stop, end in zip(stops, ends, strict=False) for _ in stop.waypoints]
         return replace(answer, map_time=self._map_time, waypoint_indices=tuple(indices) if answer.path else ())
+
+    def _leave_start(self, stops: list[_Stop]) -> Plan:
+        """Return the plan from a start that is too near to an obstacle, or why there is none."""
+        problem = self._problem
+        occupied = self._leg_plan(self._leg(*stops[:2]))
+        if occupied.status != Status.START_OCCUPIED:
+            return self._no_way(stops[1], occupied)
+        departure = find_departure(problem, self._world.field, occupied.message, self._clock.check)
+        if departure.path is None:
+            return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
+        passed = len(stops[0].waypoints)
+        rest = plan_through(departure.rest(problem), self._waypoints[passed:],
+                            replace(self._settings, planning_time=self._time(1.0)), cancel=self._cancel)
+        answer = departure.joined(rest, problem)
+        later = len(answer.poses()) - len(rest.poses())
+        indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
+        return replace(answer, waypoint_indices=indices, settings=self._settings, map_time=self._map_time)
 
     def _without_room(self, stops: list[_Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
@@ -206,7 +226,7 @@ class _Call:
 
     def _time(self, share: float) -> float:
         """Return a share of the time that is left, as a limit [s]."""
-        return max(0.001, share * self._clock.left)
+        return max(MIN_PLANNING_TIME, share * self._clock.left)
 
     # Legs
 

@@ -30,6 +30,7 @@ PARAMETERS = {
     "robot_radius": (DOUBLE, 0.2, -0.1),
     "footprint": (STRING, None, "a box"),
     "allow_unknown": (BOOL, False, "no"),
+    "start_slack": (DOUBLE, 0.0, -0.1),
     "samples": (INTEGER, 3000, 0),
     "planning_time": (DOUBLE, 1.0, 0.0),
     "goal_bias": (DOUBLE, None, 1.5),

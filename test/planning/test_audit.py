@@ -347,8 +347,8 @@ def test_the_audit_shares_no_code_with_the_planner():
             imported.add("." * node.level + (node.module or ""))
         elif isinstance(node, ast.Import):
             imported.update(name.name for name in node.names)
-    assert len(own) == 7
-    libraries = {"math", "dataclasses", "weakref", "collections.abc", "typing", "numpy", "shapely"}
+    assert len(own) == 8
+    libraries = {"math", "dataclasses", "weakref", "collections.abc", "itertools", "typing", "numpy", "shapely"}
     # Of curves only the types, for a type checker.
     assert imported - {f".{file.stem}" for file in own} - libraries == {
         "..curves.dubins", "..curves.path", "..maps.model", "..option", "..problem", "..text", "..vehicle"}

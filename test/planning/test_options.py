@@ -43,7 +43,7 @@ def test_the_options_are_those_of_the_contract():
     assert [item.name for item in options(Vehicle)] == [
         "turning_radius", "robot_radius", "footprint", "wheelbase", "max_steering_angle"]
     assert [item.name for item in options(Problem)] == [
-        "goal_tolerance_xy", "goal_tolerance_yaw", "any_goal_heading", "allow_unknown"]
+        "goal_tolerance_xy", "goal_tolerance_yaw", "any_goal_heading", "allow_unknown", "start_slack"]
     defaults = values(Settings())
     assert (defaults["planner"], defaults["samples"]) == ("rrt_star", 3000)
     assert (defaults["planning_time"], defaults["seed"]) == (1.0, -1)

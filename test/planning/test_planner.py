@@ -123,7 +123,7 @@ def test_outside_the_map(planner, pose, by):
 
 
 @pytest.mark.parametrize("pose, words", [
-    ((0, 0, 0), ("clearance 0.00 m", "(0.00, 0.00) lies in an obstacle; move it.")),
+    ((0, 0, 0), ("clearance 0.00 m", "(0.00, 0.00) lies in an obstacle; move it")),
     ((0.6, 0, 0), ("clearance 0.10 m", "nearest obstacle at (0.50, 0.00); move it", "robot_radius")),
     ((9.9, 0, 0), ("clearance 0.10 m", "nearest obstacle is the map's edge at (10.00, 0.00)", "robot_radius"))])
 def test_occupied(planner, pose, words):

@@ -28,7 +28,8 @@ from dubins_rrt_ros.planning import (
     prepare,
     values,
 )
-from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_gap, pose_gaps
+from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_gap
+from dubins_rrt_ros.planning.audit.sweep import pose_gaps
 from dubins_rrt_ros.planning.curves.dubins import shortest
 
 from .problems import AMPLE_TIME, MANY_SAMPLES, Trial, random_trial

@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 
 from dubins_rrt_ros.planning import FREE, OCCUPIED, UNKNOWN, GridMap, Map, Pose, Problem, Settings, Vehicle
-from dubins_rrt_ros.planning.audit.edges import clearances, pose_gaps
+from dubins_rrt_ros.planning.audit.edges import clearances
+from dubins_rrt_ros.planning.audit.sweep import pose_gaps
 from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 
 from .maps import MAPS, log_uniform, placed, random_origin

@@ -11,7 +11,7 @@ from ..problem import InvalidPose, checked_waypoint
 from ..text import quoted
 from .cost import COST_ERROR
 from .sweep import PRECISION, SHARE, Arcs
-from .verdict import TOLERANCE, Audit, driven_arcs, passing_findings
+from .verdict import TOLERANCE, Audit, driven_arcs, in_order, passing_findings
 
 if TYPE_CHECKING:
     from ..curves.path import Path
@@ -82,7 +82,7 @@ def pose_findings(poses: np.ndarray, path: "Path", spacing: float) -> list[str]:
         path: the path; its curves can be driven.
         spacing: maximum distance between two poses along the path [m]; 0 is any.
     """
-    arcs = _in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
+    arcs = in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
     begins = np.append(0.0, np.cumsum(arcs.length))
     places, off = _places(poses, arcs, begins, TOLERANCE + 8 * np.finfo(float).eps * float(np.abs(poses[:, :2]).max()))
     if off:
@@ -140,12 +140,6 @@ def _gap_findings(places: np.ndarray, begins: np.ndarray, curvature: np.ndarray,
     left_out = np.flatnonzero(nearest > 2 * TOLERANCE)
     if len(left_out):
         yield f"no pose is where the curvature changes, {begins[bends][left_out[0]]:.6g} m along the path"
-
-
-def _in_order(arcs: Arcs, curves: int) -> Arcs:
-    """Return the arcs of curves as they are driven; they come as all first ones, all second ones and all third ones."""
-    order = np.arange(len(arcs.x)).reshape(-1, max(curves, 1)).T.ravel()
-    return Arcs(arcs.x[order], arcs.y[order], arcs.theta[order], arcs.curvature[order], arcs.length[order])
 
 
 def _places(poses: np.ndarray, arcs: Arcs, begins: np.ndarray, tolerance: float

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..maps.model import GridMap
 from ..problem import Pose, Problem
-from .obstacles import PathsideSquares, PolygonObstacles, obstacles_of
-from .sweep import PRECISION, SHARE, Arcs, DiscSweep, PolygonSweep, clearance_findings
+from .obstacles import obstacles_of
+from .sweep import PRECISION, SHARE, Arcs, clearance_findings
 from .verdict import TOLERANCE, apart, broken_curves, driven_arcs, turn_findings
 
 if TYPE_CHECKING:
@@ -45,21 +44,6 @@ def curve_gap(curve: "DubinsCurve", problem: Problem) -> tuple[float, float]:
     """
     _, least = clearance_findings(_only(curve, problem), problem)
     return least - _own_radius(problem), max(PRECISION, SHARE * least)
-
-
-def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
-    """Return the gaps between vehicle and obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
-    world_map, unknown, vehicle = problem.map, problem.allow_unknown, problem.vehicle
-    x, y, theta = np.asarray(poses, dtype=float).T
-    if not vehicle.footprint:
-        return DiscSweep(obstacles_of(world_map, unknown)).clearance(x, y, theta) - vehicle.robot_radius
-    obstacles: PathsideSquares | PolygonObstacles
-    if isinstance(world_map, GridMap):
-        reach = vehicle.robot_radius + 8 * world_map.resolution
-        obstacles = PathsideSquares(world_map, unknown, x + 1j * y, vehicle.robot_radius, reach)
-    else:
-        obstacles = PolygonObstacles(world_map.free)
-    return PolygonSweep(vehicle.footprint, obstacles).clearance(x, y, theta)
 
 
 def clearances(points: np.ndarray, problem: Problem) -> np.ndarray:

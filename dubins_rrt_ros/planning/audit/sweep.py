@@ -45,6 +45,8 @@ MANY = 1024
 FIRST_CELLS = 24
 #: Distance within which obstacles are sought at first around a disc, in required clearances and at least [m].
 FIRST_REACH, LEAST_REACH = 3, 0.5
+#: Number of cells beyond the size of a vehicle within which its gap at a pose is measured.
+CELLS_AROUND = 8
 #: Approximate maximum number of points along a path around which cells are read.
 MOST_POINTS = 10_000
 
@@ -118,14 +120,14 @@ def _least_clearance(arcs: Arcs, problem: Problem, required_clearance: float, ob
     if not footprint:
         return _least_of_disc(arcs, obstacles, required_clearance, check_time)
     if isinstance(obstacles, PolygonObstacles):
-        return _refine(arcs, PolygonSweep(footprint, obstacles), required_clearance, check_time)
+        return refine(arcs, PolygonSweep(footprint, obstacles), required_clearance, check_time)
     reach = FIRST_CELLS * obstacles.grid.resolution
     spacing = max(reach, float(arcs.length.sum()) / MOST_POINTS)
     index, begin, _ = arcs.pieces(spacing)
     x, y, _ = arcs.at(index, begin)
     while True:
         squares = obstacles.near_path(x + 1j * y, problem.vehicle.robot_radius + spacing, reach, check_time)
-        found = _refine(arcs, PolygonSweep(footprint, squares), required_clearance, check_time)
+        found = refine(arcs, PolygonSweep(footprint, squares), required_clearance, check_time)
         if found[0] < squares.reach:
             return found
         reach *= 4
@@ -135,7 +137,7 @@ def _least_of_disc(arcs: Arcs, obstacles: Obstacles, required_clearance: float, 
     """Return what `_least_clearance` does, for a disc: obstacles far away are left out, unless there are no others."""
     reach = max(FIRST_REACH * required_clearance, LEAST_REACH)
     while True:
-        found = _refine(arcs, DiscSweep(obstacles, reach), required_clearance, check_time)
+        found = refine(arcs, DiscSweep(obstacles, reach), required_clearance, check_time)
         if found[0] < reach:
             return found
         reach *= 8
@@ -272,6 +274,17 @@ class PolygonSweep:
         return np.nonzero(kept)[0], parts[kept]
 
 
+def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
+    """Return the gaps between vehicle and obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
+    obstacles, vehicle = obstacles_of(problem.map, problem.allow_unknown), problem.vehicle
+    x, y, theta = np.asarray(poses, dtype=float).T
+    if not vehicle.footprint:
+        return DiscSweep(obstacles).clearance(x, y, theta) - vehicle.robot_radius
+    cell = 0.0 if isinstance(obstacles, PolygonObstacles) else obstacles.grid.resolution
+    near = obstacles.near_path(x + 1j * y, vehicle.robot_radius, vehicle.robot_radius + CELLS_AROUND * cell)
+    return PolygonSweep(vehicle.footprint, near).clearance(x, y, theta)
+
+
 class _LeastFound:
     """The least clearance of all points of the arcs at which it was measured, and where it is.
 
@@ -294,7 +307,7 @@ class _LeastFound:
         return found
 
 
-def _refine(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
+def refine(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
     """Divide the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
     least = _LeastFound(arcs, vehicle)
     waiting, judged = _first_pieces(arcs, least, check_time), 0

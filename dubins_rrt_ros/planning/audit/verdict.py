@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..problem import Pose, Problem, Waypoint
+from .departure import judge_clearance
 from .obstacles import Obstacles
 from .sweep import Arcs, any_time, clearance_findings
 
@@ -63,7 +64,10 @@ def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = Non
     if broken := (*_broken_ends(path), *broken_curves(path.curves)):
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = driven_arcs(path.curves, path.start)
-    too_near, least = clearance_findings(arcs, problem, obstacles=obstacles, check_time=check_time)
+    if problem.start_slack > 0:
+        too_near, least = judge_clearance(in_order(arcs, len(path.curves)), problem, obstacles, check_time)
+    else:
+        too_near, least = clearance_findings(arcs, problem, obstacles=obstacles, check_time=check_time)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
                 *turn_findings(path.curves, problem), *too_near)
     bends = (abs(arc.curvature) for curve in path.curves for arc in curve.arcs if arc.length > 0)
@@ -97,6 +101,12 @@ def driven_arcs(curves: Sequence["DubinsCurve"], start: Pose) -> tuple[np.ndarra
         poses.append(np.column_stack(arc.at(np.arange(len(starts)), along)))
     x, y, theta = np.concatenate(poses[:-1]).T
     return starts, poses[-1], Arcs(x, y, theta, curvature.ravel(), length.ravel())
+
+
+def in_order(arcs: Arcs, curves: int) -> Arcs:
+    """Return the arcs of curves as they are driven; they come as all first ones, all second ones and all third ones."""
+    order = np.arange(len(arcs.x)).reshape(-1, max(curves, 1)).T.ravel()
+    return Arcs(arcs.x[order], arcs.y[order], arcs.theta[order], arcs.curvature[order], arcs.length[order])
 
 
 def _start_findings(path: "Path", problem: Problem) -> list[str]:

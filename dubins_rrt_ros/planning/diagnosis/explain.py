@@ -16,6 +16,7 @@ from ..search.tree import Tree
 from ..text import at, distinct, metres, rounded_down, rounded_up
 from ..vehicle import Point, Vehicle
 from .components import are_separated, are_walled_off
+from .nearest_pose import nearest_free_pose
 from .obstacles import (
     MAP_EDGE,
     OBSTACLE,
@@ -65,14 +66,22 @@ def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
         if away > tolerance + ROUNDING or has_no_room(field, required, pose[:2], tolerance):
             if away > ROUNDING:
                 return Diagnosis(outside, _outside_message(problem, name, pose, tolerance, nearest), nearest)
-            return Diagnosis(occupied, *_occupied(problem, field, name, pose[:2], tolerance))
+            return _diagnosis(occupied, *_occupied(problem, field, name, pose[:2], tolerance), problem, field)
         is_one_pose = pose is problem.start or problem.exact_goal
         if problem.vehicle.footprint and is_one_pose and not field.pose_is_free(pose, problem.vehicle):
-            return Diagnosis(occupied, *_overlapping(problem, field, name, pose))
+            return _diagnosis(occupied, *_overlapping(problem, field, name, pose), problem, field)
     if are_separated(problem, field):
         between, location = _unknown_between(problem, field) or _narrow_between(problem, field, widest_passage(problem, field))
         return Diagnosis(Status.NO_VALID_PATH, f"No path exists: {between}.", location)
     return None
+
+
+def _diagnosis(status: Status, message: str, location: Point, problem: Problem, field: ClearanceField) -> Diagnosis:
+    """Return the diagnosis of an occupied pose; that of a goal names the nearest pose that is free."""
+    if status == Status.GOAL_OCCUPIED and (free := nearest_free_pose(problem, field, problem.goal)):
+        away = rounded_up(math.dist(free[:2], problem.goal[:2]))
+        message = f"{message[:-1]}; ({free[0]:.3f}, {free[1]:.3f}, {free[2]:.3f}) is free, {away} m away."
+    return Diagnosis(status, message, location)
 
 
 def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str, check_time: Callable[[], None]

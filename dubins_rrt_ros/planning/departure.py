@@ -1,0 +1,250 @@
+"""Departures: ways out of a start that is too near to an obstacle, which the search goes on from.
+
+Straight on, and in turns to either side, the vehicle drives until it is free. On the way it may come no nearer to an obstacle
+than it is at the start: the footprint, made smaller by as much as it overlaps there, has to be free all along. The audit, which
+measures that to a millionth of a metre, decides which ways will do.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from .audit.departure import judge_departure
+from .audit.verdict import audit_path, driven_arcs, in_order
+from .collision.clearance import ClearanceField
+from .collision.raster import CLEARANCE_MARGIN
+from .curves import dubins
+from .curves.dubins import DubinsCurve
+from .curves.path import Path
+from .deadline import OutOfTime
+from .maps.model import GridMap
+from .problem import Problem
+from .result import Plan, Progress, Status
+from .search.cost_to_go import CostToGo
+from .search.lower_bound import lower_bound
+from .text import at, metres
+from .vehicle import Point, Vehicle
+
+#: Lengths driven straight on before a turn, in sizes of the vehicle, and angles turned before going straight on [rad].
+STRAIGHTS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+ANGLES = np.geomspace(0.02, math.pi, 16)
+#: Length of the straight part after a turn, in sizes of the vehicle.
+AFTER_TURN = 4.0
+#: Distance between the poses that are tried as the end, in sizes of the vehicle.
+STEP = 0.02
+#: Maximum number of departures that the audit looks at.
+MAX_AUDITED = 12
+#: Number of times that the interval is halved in which the depth at the start lies; and number of swings into obstacles that are
+#: tried where no way leads out, and times that the interval between two of them is halved.
+HALVINGS, SWINGS, SWING_HALVINGS = 30, 8, 5
+#: Depths below this are due to rounding [m].
+ROUNDING = 1e-6
+
+
+class Departure(NamedTuple):
+    """The way out of a start that is too near to an obstacle, or why there is none.
+
+    Attributes:
+        path: from the start to a pose that is free, or None.
+        message: what is to be said of it, as a clause, or as a sentence where there is no path.
+        location: of the obstacle that shows it [m], or None.
+    """
+
+    path: Path | None
+    message: str
+    location: Point | None = None
+
+    def rest(self, problem: Problem) -> Problem:
+        """Return the problem from the end of the departure on."""
+        assert self.path is not None
+        return replace(problem, start=self.path.end, start_slack=0.0)
+
+    def joined(self, plan: Plan, problem: Problem) -> Plan:
+        """Return the plan of a problem, given that of its rest; the whole path is audited."""
+        assert self.path is not None
+        tree, bound = plan.tree.after(self.path), lower_bound(problem)
+        if plan.path is None:
+            message = f"{plan.message[:-1]}; from where it leaves the start, {at(self.path.end[:2])}, on."
+            return replace(plan, problem=problem, tree=tree, lower_bound=bound, message=message)
+        path = Path.of_curves(problem.start, plan.path.end, [*self.path.curves, *plan.path.curves])
+        audit = audit_path(path, problem)
+        if not audit.ok:
+            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
+            return replace(plan, status=Status.UNKNOWN, message=message, problem=problem, path=None, tree=tree, audit=audit)
+        message = f"Path of {path.length:.2f} m; {self.message}; from there on: {plan.message}"
+        return replace(plan, message=message, problem=problem, path=path, tree=tree, audit=audit, start_too_near=True,
+                       lower_bound=min(bound, path.length))
+
+    def progress(self, report: Progress, problem: Problem) -> Progress:
+        """Return the report on the problem, given one on its rest."""
+        path = self.path
+        assert path is not None
+        length = None if report.length is None else report.length + path.length
+        return replace(report, length=length, snapshot=lambda: self.joined(report.snapshot(), problem),
+                       tree=lambda: report.tree().after(path))
+
+
+def find_departure(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:
+    """Find a way out of an occupied start, as far as there is time.
+
+    Args:
+        problem: with a `start_slack`.
+        field: the clearance of its map.
+        occupied: the sentence on the start that is said without slack.
+        check_time: called between the steps of the work; it raises OutOfTime where that has to end.
+    """
+    try:
+        return _found(problem, field, occupied, check_time)
+    except OutOfTime:
+        return Departure(None, f"{occupied[:-1]}; there was no time left to look for a way out of it.")
+
+
+def _found(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:
+    depth = _depth(problem, field)
+    depth = depth if depth > ROUNDING else 0.0
+    if depth > problem.start_slack + ROUNDING:
+        return Departure(None, *_too_deep(problem, occupied, depth))
+    smaller = _smaller(problem.vehicle, depth + 1.5 * CLEARANCE_MARGIN)
+    if smaller is not None:
+        to_goal = CostToGo.to_goal(problem, field)
+        found = sorted(_ways_out(problem, field, smaller, check_time), key=lambda path: _promise(path, problem, to_goal))
+        for path in found[:MAX_AUDITED]:
+            arcs = in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
+            if not judge_departure(arcs, problem, check_time).findings:
+                near = f"{metres(depth)} m too near to" if depth > 0 else "within a millimetre of"
+                return Departure(path, f"the start is {near} an obstacle, which is left within {path.length:.2f} m")
+    return Departure(None, _no_way_out(problem, field, occupied, depth, check_time))
+
+
+def _ways_out(problem: Problem, field: ClearanceField, smaller: Vehicle, check_time: Callable[[], None]) -> Iterator[Path]:
+    """Yield paths to a pose that is free, along which the smaller vehicle is free."""
+    checker, vehicle = field.collision_checker(smaller), problem.vehicle
+    whole = field.collision_checker(vehicle)
+    for curve in _curves(problem):
+        check_time()
+        lengths = np.array(curve.lengths)
+        for length in np.arange(1, math.floor(curve.length / _step(vehicle))) * _step(vehicle):
+            pose = curve.pose_at(length)
+            if not checker.is_pose_free(pose):
+                break
+            if whole.is_pose_free(pose) and field.at(np.array(pose[:2])) > 0:
+                part = np.clip(length - np.cumsum(lengths) + lengths, 0, lengths)
+                if checker.is_motion_free(curve.start, curve.radius, curve.index, part):
+                    first, second, third = part.tolist()
+                    yield Path.of_curves(problem.start, pose, [replace(curve, lengths=(first, second, third))])
+                break
+
+
+def _curves(problem: Problem) -> Iterator[DubinsCurve]:
+    """Yield the curves from the start that may lead out of it: straight on and then a turn, and the other way round."""
+    radius, size = problem.vehicle.turning_radius, _size(problem.vehicle)
+    for word in ("LSL", "RSR"):
+        for straight in STRAIGHTS:
+            yield DubinsCurve(problem.start, radius, word, (0.0, straight * size, math.pi * radius))
+        for angle in ANGLES.tolist():
+            yield DubinsCurve(problem.start, radius, word, (angle * radius, AFTER_TURN * size, 0.0))
+    yield DubinsCurve(problem.start, radius, "LSL", (0.0, 2 * AFTER_TURN * size, 0.0))
+
+
+def _promise(path: Path, problem: Problem, to_goal: CostToGo) -> float:
+    """Return about how long a path to the goal is that begins with a departure [m]."""
+    end = path.end
+    rest = dubins.shortest(end, problem.goal, path.radius).length
+    return path.length + max(rest, float(to_goal.at(np.array([end[:2]]))[0]))
+
+
+def _size(vehicle: Vehicle) -> float:
+    return max(vehicle.circumscribed_radius, vehicle.maneuver_scale / 4)
+
+
+def _step(vehicle: Vehicle) -> float:
+    return STEP * _size(vehicle)
+
+
+def _smaller(vehicle: Vehicle, depth: float) -> Vehicle | None:
+    """Return a vehicle that is smaller by a depth all around, or None where nothing is left of it."""
+    if not vehicle.footprint:
+        return replace(vehicle, robot_radius=max(0.0, vehicle.robot_radius - depth))
+    outline = shapely.buffer(shapely.Polygon(vehicle.footprint), -depth, join_style="mitre")
+    if outline.geom_type != "Polygon" or outline.is_empty:
+        return None
+    return replace(vehicle, footprint=tuple((x, y) for x, y in outline.exterior.coords[:-1]))
+
+
+def _depth(problem: Problem, field: ClearanceField) -> float:
+    """Return to what depth obstacles reach into the vehicle at its start [m]; not above 0 where they do not."""
+    vehicle = problem.vehicle
+    if not vehicle.footprint:
+        return vehicle.robot_radius - float(field.at(np.array(problem.start[:2])))
+    overlap = _overlap(problem)
+    low, high = 0.0, vehicle.circumscribed_radius
+    for _ in range(HALVINGS):
+        depth = (low + high) / 2
+        touches = _outline(problem, -depth).intersects(overlap)
+        low, high = (depth, high) if touches else (low, depth)
+    return high if overlap.area > 0 else 0.0
+
+
+def _outline(problem: Problem, wider: float = 0.0) -> shapely.Geometry:
+    """Return the vehicle at its start, in the map's frame, made wider all around."""
+    x, y, theta = problem.start
+    turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
+    corners = np.array(problem.vehicle.footprint) @ turn + np.array([x, y])
+    return shapely.buffer(shapely.Polygon(corners), wider, join_style="mitre")
+
+
+def _overlap(problem: Problem) -> shapely.Geometry:
+    """Return what obstacles cover of the vehicle at its start."""
+    outline, world_map = _outline(problem), problem.map
+    if not isinstance(world_map, GridMap):
+        return shapely.difference(outline, world_map.free)
+    outside = shapely.difference(outline, shapely.Polygon(world_map.corners()))
+    return shapely.union_all([shapely.intersection(outline, shapely.union_all(_cells(problem))), outside])
+
+
+def _cells(problem: Problem) -> np.ndarray:
+    """Return the squares of the blocked cells around the vehicle at its start."""
+    grid = problem.map.window(problem.start[:2], problem.vehicle.circumscribed_radius)  # type: ignore[union-attr]
+    rows, columns = np.nonzero(grid.blocked(problem.allow_unknown))
+    corners = np.stack([columns, rows], axis=-1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    return np.asarray(shapely.polygons(grid.to_map_frame(corners * grid.resolution)))
+
+
+def _too_deep(problem: Problem, occupied: str, depth: float) -> tuple[str, Point | None]:
+    """Return the sentence on a start in which obstacles reach deeper than the slack, and the place of the deepest."""
+    allowed = f"start_slack is {problem.start_slack:g} m"
+    if not problem.vehicle.footprint:
+        return f"{occupied[:-1]}; it is {metres(depth)} m too near, and {allowed}.", None
+    place = _overlap(problem).intersection(_outline(problem, -0.999 * depth)).representative_point()
+    where = (place.x, place.y) if not place.is_empty else problem.start[:2]
+    count = "obstacles reach"
+    if isinstance(problem.map, GridMap):
+        deep = int(np.count_nonzero(shapely.intersects(_cells(problem), _outline(problem, -problem.start_slack))))
+        count = "1 cell reaches" if deep == 1 else f"{deep} cells reach"
+    return (f"Start is occupied: {count} farther into the footprint than {allowed}, the deepest by {metres(depth)} m at "
+            f"{at(where)}; move it, clear the map there, or allow more."), where
+
+
+def _no_way_out(problem: Problem, field: ClearanceField, occupied: str, depth: float, check_time: Callable[[], None]) -> str:
+    """Return the sentence on a start that nothing leads out of: how far the vehicle would swing into obstacles on the way."""
+    near = f"the start is {metres(depth)} m too near, within start_slack {problem.start_slack:g} m, but"
+
+    def leads_out(deeper: float) -> bool:
+        smaller = _smaller(problem.vehicle, depth + deeper)
+        return smaller is not None and next(_ways_out(problem, field, smaller, check_time), None) is not None
+
+    swings = np.linspace(0, problem.vehicle.circumscribed_radius - depth, SWINGS + 1).tolist()
+    enough = next((n for n, swing in enumerate(swings) if n and leads_out(swing)), None)
+    if enough is None:
+        return f"{occupied[:-1]}; {near} no way leads out of it."
+    low, high = swings[enough - 1:enough + 1]
+    for _ in range(SWING_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if leads_out(middle) else (middle, high)
+    what = "its tail swings" if problem.vehicle.footprint else "it comes"
+    return (f"{occupied[:-1]}; {near} the vehicle cannot leave it: as it turns away {what} {metres(high)} m farther in, and it "
+            "may come no nearer than it is.")
