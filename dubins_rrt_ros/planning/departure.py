@@ -24,6 +24,7 @@ from .deadline import OutOfTime
 from .maps.model import GridMap
 from .problem import Problem
 from .result import Plan, Progress, Status
+from .search.cost import Objective
 from .search.cost_to_go import CostToGo
 from .search.lower_bound import lower_bound
 from .text import at, metres
@@ -63,29 +64,33 @@ class Departure(NamedTuple):
         assert self.path is not None
         return replace(problem, start=self.path.end, start_slack=0.0)
 
-    def joined(self, plan: Plan, problem: Problem) -> Plan:
+    def joined(self, plan: Plan, problem: Problem, field: ClearanceField) -> Plan:
         """Return the plan of a problem, given that of its rest; the whole path is audited."""
         assert self.path is not None
-        tree, bound = plan.tree.after(self.path), lower_bound(problem)
+        objective = Objective.of(problem, plan.settings, field)
+        tree, bound = plan.tree.after(self.path, objective.curve_costs(self.path)), lower_bound(problem)
+        answer = replace(plan, problem=problem, tree=tree, lower_bound=bound, cost_lower_bound=bound)
         if plan.path is None:
-            message = f"{plan.message[:-1]}; from where it leaves the start, {at(self.path.end[:2])}, on."
-            return replace(plan, problem=problem, tree=tree, lower_bound=bound, message=message)
+            return replace(answer, message=f"{plan.message[:-1]}; from where it leaves the start, {at(self.path.end[:2])}, on.")
         path = Path.of_curves(problem.start, plan.path.end, [*self.path.curves, *plan.path.curves])
         audit = audit_path(path, problem)
         if not audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return replace(plan, status=Status.UNKNOWN, message=message, problem=problem, path=None, tree=tree, audit=audit)
+            return replace(answer, status=Status.UNKNOWN, message=message, path=None, cost=None, audit=audit)
+        node = np.flatnonzero((plan.tree.poses == plan.path.end).all(axis=1) & (plan.tree.costs == plan.cost))[0]
         message = f"Path of {path.length:.2f} m; {self.message}; from there on: {plan.message}"
-        return replace(plan, message=message, problem=problem, path=path, tree=tree, audit=audit, start_too_near=True,
-                       lower_bound=min(bound, path.length))
+        bound = min(bound, path.length)
+        return replace(answer, message=message, path=path, audit=audit, start_too_near=True, lower_bound=bound,
+                       cost=float(tree.costs[node + len(self.path.curves)]), cost_lower_bound=bound)
 
-    def progress(self, report: Progress, problem: Problem) -> Progress:
+    def progress(self, report: Progress, problem: Problem, field: ClearanceField) -> Progress:
         """Return the report on the problem, given one on its rest."""
-        path = self.path
-        assert path is not None
-        length = None if report.length is None else report.length + path.length
-        return replace(report, length=length, snapshot=lambda: self.joined(report.snapshot(), problem),
-                       tree=lambda: report.tree().after(path))
+        def snapshot() -> Plan:
+            return self.joined(report.snapshot(), problem, field)
+
+        assert self.path is not None
+        length = None if report.length is None else report.length + self.path.length
+        return replace(report, length=length, snapshot=snapshot, tree=lambda: snapshot().tree)
 
 
 def find_departure(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:

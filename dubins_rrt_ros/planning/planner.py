@@ -166,9 +166,9 @@ class _Call:
             return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
         settings = replace(self._settings, planning_time=max(MIN_PLANNING_TIME, self._deadline.left))
         found = plan(departure.rest(problem), settings, cancel=self._deadline.cancel, seed_path=self._seed_path,
-                     on_progress=lambda report: self._on_progress(departure.progress(report, problem)),
+                     on_progress=lambda report: self._on_progress(departure.progress(report, problem, field)),
                      report_samples=self._report_samples)
-        return replace(departure.joined(found, problem), settings=self._settings, map_time=self._map_time)
+        return replace(departure.joined(found, problem, field), settings=self._settings, map_time=self._map_time)
 
     def _is_cancelled(self) -> bool:
         self._deadline.poll()

@@ -142,7 +142,7 @@ class _Call:
         passed = len(stops[0].waypoints)
         rest = plan_through(departure.rest(problem), self._waypoints[passed:],
                             replace(self._settings, planning_time=self._time(1.0)), cancel=self._cancel)
-        answer = departure.joined(rest, problem)
+        answer = departure.joined(rest, problem, self._world.field)
         later = len(answer.poses()) - len(rest.poses())
         indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
         return replace(answer, waypoint_indices=indices, settings=self._settings, map_time=self._map_time)

@@ -3,10 +3,12 @@
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from .audit.obstacles import Obstacles, obstacles_of
 from .collision.clearance import ClearanceField
 from .collision.footprint import cover
-from .maps.model import Map
+from .maps.model import GridMap, Map
 from .vehicle import Vehicle
 
 
@@ -78,9 +80,15 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
 
 def _reuse(world: World, previous: World) -> None:
     """Take over from `previous` what `world` has in common with it."""
-    if world.map is previous.map:
+    if world.map is previous.map or _are_equal(world.map, previous.map):
         takes_as_much_room = world.vehicle.required_clearance == previous.vehicle.required_clearance
         world.field = previous.field if takes_as_much_room else previous.field.shared()
         world.obstacles = previous.obstacles
     else:
         world.field = ClearanceField(world.map, world.allow_unknown, previous.field)
+
+
+def _are_equal(one: Map, other: Map) -> bool:
+    """Return True for two grids that are the same but for their names."""
+    return (isinstance(one, GridMap) and isinstance(other, GridMap) and one.thresholds == other.thresholds
+            and (one.resolution, one.origin) == (other.resolution, other.origin) and np.array_equal(one.data, other.data))

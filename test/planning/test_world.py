@@ -7,9 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.cases import boxes_grid, holed_polygons, scaled
+from scipy import ndimage
+from support.cases import boxes_grid, holed_polygons, needs_compiled, scaled
 
-from dubins_rrt_ros.planning import GridMap, OptionError, Problem, Settings, Vehicle, World, audit_path, plan, prepare
+from dubins_rrt_ros.planning import (
+    GridMap,
+    OptionError,
+    Problem,
+    Settings,
+    Thresholds,
+    Vehicle,
+    World,
+    audit_path,
+    plan,
+    prepare,
+)
+from dubins_rrt_ros.planning._kernels.components import label_components
 from dubins_rrt_ros.planning.collision import clearance as clearance_module
 
 SMALL, LARGE = Vehicle(0.5, 0.1), Vehicle(0.7, 0.4)
@@ -44,8 +57,10 @@ def assert_same(found, expected):
 
 
 def changed_map(rng, grid):
-    """The grid with some boxes of cells changed, on another place or with another shape now and then."""
+    """The grid with some boxes of cells changed, or scattered ones; on another place or with another shape now and then."""
     data = grid.data.copy()
+    if rng.random() < 0.2:
+        data.flat[rng.integers(0, data.size, rng.integers(1, 100))] = rng.choice([0, 100, -1])
     for _ in range(rng.integers(4)):
         row, column = rng.integers(0, data.shape)
         height, width = rng.integers(1, 15, 2)
@@ -59,12 +74,53 @@ def changed_map(rng, grid):
 def test_an_updated_world_is_the_world_of_the_new_map(allow_unknown):
     rng = np.random.default_rng(6)
     world = world_of(allow_unknown=allow_unknown)
-    for _ in range(scaled(100, least=10)):
+    for _ in range(scaled(200, least=10)):
         before = world, parts_of(world)
         world = world.updated(changed_map(rng, world.map))
         assert_same(world, prepare(world.map, SMALL, allow_unknown))
         for part, kept in zip(parts_of(before[0]), before[1], strict=True):
             np.testing.assert_array_equal(part, kept)
+
+
+@needs_compiled
+def test_of_a_large_map_what_is_far_from_a_change_is_kept():
+    """The columns between two changes are too many to be looked at together."""
+    rng = np.random.default_rng(10)
+    data = np.zeros((60, 700), np.int8)
+    data[rng.integers(0, 60, 500), rng.integers(0, 700, 500)] = 100
+    world = prepare(GridMap(data, 0.1), SMALL)
+    for _ in range(30):
+        data = world.map.data.copy()
+        for column in rng.choice(690, rng.integers(1, 4)):
+            data[rng.integers(60), column:column + 9] = rng.choice([0, 100])
+        world = world.updated(GridMap(data, 0.1, percent=True))
+        assert_same(world, prepare(world.map, SMALL))
+
+
+def test_an_equal_map_shares_all(monkeypatch):
+    world = world_of()
+    calls = counted(monkeypatch, "grid_clearance", "free_squares")
+    again = world.updated(GridMap(world.map.data.copy(), world.map.resolution, world.map.origin, "again"))
+    assert (again.field, again.obstacles, again.map.name) == (world.field, world.obstacles, "again")
+    assert calls == {"grid_clearance": 0, "free_squares": 0}
+    other = GridMap(world.map.data, world.map.resolution, world.map.origin, thresholds=Thresholds(0, 100))
+    assert world.updated(other).field is not world.field
+
+
+@needs_compiled
+@pytest.mark.parametrize("density", [0.0, 0.05, 0.4, 0.6, 0.9, 1.0])
+def test_components_are_numbered_as_by_scipy_but_for_the_order(density):
+    rng = np.random.default_rng(11)
+    for shape in ((1, 1), (1, 40), (40, 1), (37, 53), (90, 64)):
+        cells = (rng.random(shape) < density).astype(np.float32)
+        labels = np.empty(shape, np.int32)
+        count = label_components(cells, 0.5, labels)
+        expected, expected_count = ndimage.label(cells, structure=np.ones((3, 3)))
+        assert count == expected_count
+        pairs = {*zip(labels.ravel().tolist(), expected.ravel().tolist(), strict=True)}
+        assert len(pairs) == count + (not cells.all())
+        firsts = [np.flatnonzero(labels == n + 1)[0] for n in range(count)]
+        assert firsts == sorted(firsts)
 
 
 def test_a_world_of_polygons_is_updated_as_a_whole():

@@ -37,15 +37,23 @@ def free_squares(clearance: Clearance, block: cython.int, required_clearance: cy
     rows: cython.int = clearance.field.shape[0]
     columns: cython.int = clearance.field.shape[1]
     found = np.zeros(((rows + block - 1) // block + 3, (columns + block - 1) // block + 3), np.int8)
-    free: cython.schar[:, ::1] = found
+    find_free_squares(clearance, block, required_clearance, found, 0, columns)
+    return found
+
+
+def find_free_squares(clearance: Clearance, block: cython.int, required_clearance: cython.double, free: cython.schar[:, ::1],
+                      first: cython.int, last: cython.int):
+    """Write what `free_squares` returns to `free`, for the squares with cells in the columns from `first` to before `last`."""
     row: cython.int
     column: cython.int
+    begin: cython.int = first // block * block
+    end: cython.int = min((last + block - 1) // block * block, cython.cast(cython.int, clearance.field.shape[1]))
     with cython.nogil:
-        for row in range(rows):
-            for column in range(columns):
+        free[:, begin // block + 1:(end + block - 1) // block + 1] = 0
+        for row in range(cython.cast(cython.int, clearance.field.shape[0])):
+            for column in range(begin, end):
                 if not free[row // block + 1, column // block + 1] and may_be_free(clearance, row, column, required_clearance):
                     free[row // block + 1, column // block + 1] = 1
-    return found
 
 
 def greatest_clearances(clearance: Clearance, block: cython.int, free: cython.schar[:, ::1], enough: cython.double,

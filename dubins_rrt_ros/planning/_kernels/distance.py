@@ -73,6 +73,52 @@ def fill_columns(row_gap: cython.int[:, ::1], first: cython.int, last: cython.in
                     out[row, column + i] = of_squared[squared[i, row + 1]]
 
 
+def reached_columns(bounds: cython.float[:, ::1], cell: cython.double, first_row: cython.int, last_row: cython.int,
+                    first_column: cython.int, last_column: cython.int):
+    """Find the columns with cells that may lie as far from their nearest obstacle as from a box of cells.
+
+    The distance of no other cell changes with the box. The straight way from such a cell to the box holds only points like it,
+    since neither distance falls by more than the way is long. In each column that it crosses there is a cell at most half a cell
+    off it, for which they compare the same to within a cell. So beyond columns without such cells there are none.
+
+    Args:
+        bounds: (rows, columns) float32, the lower bounds of the clearance [m].
+        cell: the side of a cell [m].
+        first_row, last_row, first_column, last_column: of the box; the last ones are those behind it.
+
+    Returns:
+        The first column and the one behind the last.
+    """
+    columns: cython.int = cython.cast(cython.int, bounds.shape[1])
+    first: cython.int = first_column
+    last: cython.int = last_column
+    with cython.nogil:
+        while first > 0 and is_reached(bounds, cell, first - 1, first_row, last_row, first_column - first + 1):
+            first -= 1
+        while last < columns and is_reached(bounds, cell, last, first_row, last_row, last - last_column + 1):
+            last += 1
+    return first, last
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def is_reached(bounds: cython.float[:, ::1], cell: cython.double, column: cython.int, first_row: cython.int,
+               last_row: cython.int, aside: cython.int) -> cython.bint:
+    """Return whether a column has such a cell, which is `aside` columns beside the box."""
+    row: cython.int
+    beyond: cython.double
+    at_most: cython.double
+    for row in range(cython.cast(cython.int, bounds.shape[0])):
+        beyond = max(0, max(first_row - row, row - last_row + 1))
+        # A cell for what `reached_columns` says, sqrt(2) for what the bounds are lower by, and the rest for rounding.
+        at_most = max(0.0, cython.cast(cython.double, bounds[row, column])) / cell + 2.5
+        if at_most * at_most >= beyond * beyond + aside * aside:
+            return True
+    return False
+
+
 def envelope(column, apex, height, begin):
     """Replace the gaps of a column's cells by the squared distances.
 

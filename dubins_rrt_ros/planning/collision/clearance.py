@@ -18,7 +18,8 @@ from scipy import ndimage
 from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.collision import CollisionChecker, PolygonChecker
-from .._kernels.cost_to_go import free_squares, greatest_clearances
+from .._kernels.components import label_components
+from .._kernels.cost_to_go import find_free_squares, free_squares, greatest_clearances
 from .._kernels.eikonal import node_slowness
 from .._kernels.room import CornerIndex, FootprintRoom, Room
 from ..curves.dubins import DubinsCurve
@@ -68,20 +69,34 @@ class ClearanceField:
         computed; the result is the same as without it, and the previous field stays as it is.
         """
         self.kernel: GridClearance | PolygonClearance
+        self._forget()
         if isinstance(world_map, GridMap):
             similar = previous.kernel if previous and isinstance(previous.kernel, GridClearance) else None
-            self.kernel = grid_clearance(world_map, allow_unknown, similar)
+            self.kernel, differ = grid_clearance(world_map, allow_unknown, similar)
             self.frame, self._polygons = Frame(*world_map.origin), None
+            if previous and differ is not None:
+                self._take_over(previous, differ)
         else:
             self.kernel = polygon_clearance(world_map)
             x0, y0 = world_map.corners()[0].tolist()
             self.frame, self._polygons = Frame(x0, y0, 0.0), world_map.free
-        self._forget()
 
     def _forget(self) -> None:
         self._components: tuple[float, np.ndarray] | None = None
         self._free_squares: tuple[float, FreeSquares] | None = None
         self._slowness: dict[bool, tuple[tuple[float, float, float], tuple[np.ndarray, np.ndarray]]] = {}
+
+    def _take_over(self, previous: "ClearanceField", columns: list[slice]) -> None:
+        """Take over from another field the components, if no columns differ, and the free squares of those that do not."""
+        if not columns:
+            self._components = previous._components
+        if previous._free_squares is not None:
+            required_clearance, (cells, squares) = previous._free_squares
+            if columns and required_clearance >= 0:
+                squares = squares.copy()
+                for some in columns:
+                    find_free_squares(self.kernel, cells, required_clearance, squares, some.start, some.stop)
+            self._free_squares = required_clearance, FreeSquares(cells, squares)
 
     def shared(self) -> "ClearanceField":
         """Return the same distances for another vehicle, whose components and free squares are kept apart from these."""
@@ -163,9 +178,15 @@ class ClearanceField:
         """
         kept = self._components
         if kept is None or kept[0] != required_clearance:
-            labels, _ = ndimage.label(self.possibly_free(required_clearance), structure=np.ones((3, 3)))
-            self._components = kept = required_clearance, labels
+            self._components = kept = required_clearance, self._find_components(required_clearance)
         return kept[1]
+
+    def _find_components(self, required_clearance: float) -> np.ndarray:
+        if not COMPILED:
+            return np.asarray(ndimage.label(self.possibly_free(required_clearance), structure=np.ones((3, 3)))[0])
+        labels = np.empty(self.kernel.field.shape, np.int32)
+        label_components(self.kernel.field, self._least_bound(required_clearance), labels)
+        return labels
 
     def free_squares(self, required_clearance: float) -> FreeSquares:
         """Return the squares that may hold a point with the required clearance [m]; they are kept for the last one."""
@@ -206,11 +227,16 @@ class ClearanceField:
         return kept[1]
 
     def _may_be_free(self, bounds: np.ndarray, required_clearance: float) -> np.ndarray:
-        if required_clearance < 0:
-            return np.ones(bounds.shape, bool)
-        # The bound of a cell is at most two of its diagonals below the clearance of any point in it.
-        enough: np.ndarray = bounds >= max(0.0, required_clearance - 2 * math.sqrt(2) * self.kernel.resolution - 1e-6)
+        enough: np.ndarray = bounds >= self._least_bound(required_clearance)
         return enough
+
+    def _least_bound(self, required_clearance: float) -> float:
+        """Return the bound that a cell needs to hold a point with the required clearance [m]; that of an obstacle is -1."""
+        if required_clearance < 0:
+            return -math.inf
+        # The bound of a cell is at most two of its diagonals below the clearance of any point in it.
+        cell: float = self.kernel.resolution
+        return max(0.0, required_clearance - 2 * math.sqrt(2) * cell - 1e-6)
 
 
 def _cells_of_square(shape: tuple[int, int], wish: float) -> int:

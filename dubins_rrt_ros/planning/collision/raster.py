@@ -4,6 +4,7 @@ A cell of a grid map is a cell of its raster; over polygons lies a raster of its
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -11,7 +12,7 @@ from scipy import ndimage
 
 from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
-from .._kernels.distance import fill_columns, measure_row_gaps
+from .._kernels.distance import fill_columns, measure_row_gaps, reached_columns
 from .._kernels.edge_raster import rasterise_edges
 from ..maps.model import GridMap, PolygonMap
 
@@ -21,24 +22,31 @@ CLEARANCE_MARGIN = 0.0005
 FEW_CELLS, MANY_CELLS, MANY_EDGES = (1_000_000, 2_300_000, 3_000) if COMPILED else (35_000, 35_000, 3_000)
 #: Approximate maximum number of times that an edge touches a cell.
 MAX_TOUCHED = 50_000_000 if COMPILED else 500_000
-#: Number of columns at a time that are searched for cells that a change reaches.
-STRIP = 64
+#: Maximum distance up to which tables of bounds are kept for the next map [cells].
+KEPT = 1024
+#: Number of columns without changes from which on what changes on either side is looked at apart, and share of the columns that
+#: may differ from which on all are computed afresh.
+APART, AFRESH = 64, 0.75
 
 
-def grid_clearance(grid: GridMap, allow_unknown: bool, previous: GridClearance | None) -> GridClearance:
+def grid_clearance(grid: GridMap, allow_unknown: bool, previous: GridClearance | None
+                   ) -> tuple[GridClearance, list[slice] | None]:
     """Return the distances to the blocked cells of a grid.
 
     Args:
         grid: the cells.
         allow_unknown: True if unknown cells are free.
         previous: the distances of another grid; if that has the same shape and resolution, only what differs is computed.
+
+    Returns:
+        The distances, and the columns outside which they are those of `previous`; None where they were computed afresh.
     """
-    free, cell = ~grid.blocked(allow_unknown), grid.resolution
+    free, cell, differs = ~grid.blocked(allow_unknown), grid.resolution, None
     if COMPILED and previous is not None and (previous.field.shape, previous.resolution) == (free.shape, cell):
-        row_gap, bounds = _changed(previous, free)
+        row_gap, bounds, differs = _changed(previous, free)
     else:
         row_gap, bounds = _distances(free, cell)
-    return GridClearance(field=bounds, resolution=cell, origin=grid.origin, margin=CLEARANCE_MARGIN, row_gap=row_gap)
+    return GridClearance(field=bounds, resolution=cell, origin=grid.origin, margin=CLEARANCE_MARGIN, row_gap=row_gap), differs
 
 
 def _distances(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
@@ -46,15 +54,22 @@ def _distances(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
     if not COMPILED:
         return _by_scipy(free, cell)
     row_gap, bounds = np.empty(free.shape, np.int32), np.empty(free.shape, np.float32)
-    _fill(row_gap, bounds, free, cell, *(slice(0, n) for n in free.shape))
+    measure_row_gaps(free.view(np.uint8), row_gap)
+    _fill_columns(row_gap, bounds, cell, slice(0, free.shape[1]))
     return row_gap, bounds
 
 
-def _fill(row_gap: np.ndarray, bounds: np.ndarray, free: np.ndarray, cell: float, rows: slice, columns: slice) -> None:
-    """Compute the row gaps in some rows, and with them the bounds in some columns."""
-    measure_row_gaps(free[rows].view(np.uint8), row_gap[rows])
-    farthest = min(int(row_gap[:, columns].max()) >> 2, (min(free.shape) + 1) // 2)
-    fill_columns(row_gap, columns.start, columns.stop, _bound_of_squared(farthest, cell), bounds)
+def _fill_columns(row_gap: np.ndarray, bounds: np.ndarray, cell: float, columns: slice) -> None:
+    """Compute the bounds in some columns from the row gaps."""
+    farthest = min(int(row_gap[:, columns].max()) >> 2, (min(bounds.shape) + 1) // 2)
+    table = _kept_bounds(1 << (farthest - 1).bit_length(), cell) if 0 < farthest <= KEPT else _bound_of_squared(farthest, cell)
+    fill_columns(row_gap, columns.start, columns.stop, table, bounds)
+
+
+@lru_cache(maxsize=4)
+def _kept_bounds(farthest: int, cell: float) -> np.ndarray:
+    """Return what `_bound_of_squared` does, for maps that change."""
+    return _bound_of_squared(farthest, cell)
 
 
 def _bound_of_squared(farthest: int, cell: float) -> np.ndarray:
@@ -66,40 +81,45 @@ def _bound_of_squared(farthest: int, cell: float) -> np.ndarray:
     return bounds
 
 
-def _changed(kernel: GridClearance, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the row gaps and the bounds where other cells are free, computed afresh only where these matter."""
-    row_gap, bounds = np.asarray(kernel.row_gap), np.asarray(kernel.field)
-    changes = free != (row_gap != 0)
-    if not changes.any():
-        return row_gap, bounds  # which nothing writes to
-    rows, columns = (slice(n[0], n[-1] + 1) for n in (np.flatnonzero(changes.any(axis=axis)) for axis in (1, 0)))
-    reached = _reached(bounds, kernel.resolution, rows, columns)
-    row_gap, bounds = row_gap.copy(), bounds.copy()
-    _fill(row_gap, bounds, free, kernel.resolution, rows, reached)
-    return row_gap, bounds
+def _changed(kernel: GridClearance, free: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[slice]]:
+    """Return the row gaps and the bounds where other cells are free, computed only where these matter, and those columns."""
+    row_gap, bounds, cell = np.asarray(kernel.row_gap), np.asarray(kernel.field), kernel.resolution
+    boxes = _boxes(free != (row_gap != 0))
+    reached = _united([slice(*reached_columns(bounds, cell, rows.start, rows.stop, columns.start, columns.stop))
+                       for rows, columns in boxes])
+    if sum(columns.stop - columns.start for columns in reached) > AFRESH * free.shape[1]:
+        return *_distances(free, cell), [slice(0, free.shape[1])]
+    if boxes:  # else nothing writes to them
+        row_gap, bounds = row_gap.copy(), bounds.copy()
+    for rows, _ in boxes:
+        measure_row_gaps(free[rows].view(np.uint8), row_gap[rows])
+    for columns in reached:
+        _fill_columns(row_gap, bounds, cell, columns)
+    return row_gap, bounds, reached
 
 
-def _reached(bounds: np.ndarray, cell: float, rows: slice, columns: slice) -> slice:
-    """Return the columns with all cells that may lie as far from their nearest obstacle as from a box of cells.
+def _boxes(changes: np.ndarray) -> list[tuple[slice, slice]]:
+    """Return rows and columns of boxes that hold all cells that changed; those with few columns between them share one."""
+    columns = np.flatnonzero(changes.any(axis=0))
+    if not len(columns):
+        return []
+    boxes = []
+    for some in np.split(columns, np.flatnonzero(np.diff(columns) > APART) + 1):
+        box = slice(int(some[0]), int(some[-1]) + 1)
+        rows = np.flatnonzero(changes[:, box].any(axis=1))
+        boxes.append((slice(int(rows[0]), int(rows[-1]) + 1), box))
+    return boxes
 
-    The distance of no other cell changes with the box. The straight way from such a cell to the box holds only points like it,
-    since neither distance falls by more than the way is long. In each column that it crosses there is a cell at most half a cell
-    off it, for which they compare the same to within a cell. So beyond columns without such cells there are none.
-    """
-    beyond_rows, beyond_columns = (np.maximum(np.maximum(box.start - n, n - box.stop + 1), 0)
-                                   for box, n in zip((rows, columns), map(np.arange, bounds.shape), strict=True))
 
-    def is_reached(strip: slice) -> bool:
-        # A cell for what is said above, sqrt(2) for what the bounds are lower by, and the rest for rounding.
-        at_most = np.maximum(bounds[:, strip], 0) / cell + 2.5
-        return bool((at_most**2 >= beyond_rows[:, None]**2 + beyond_columns[strip]**2).any())
-
-    first, last = columns.start, columns.stop
-    while first > 0 and is_reached(slice(max(0, first - STRIP), first)):
-        first = max(0, first - STRIP)
-    while last < bounds.shape[1] and is_reached(slice(last, last + STRIP)):
-        last = min(bounds.shape[1], last + STRIP)
-    return slice(first, last)
+def _united(slices: list[slice]) -> list[slice]:
+    """Return slices, ordered by their starts, with those that overlap or touch made one."""
+    united: list[slice] = []
+    for one in sorted(slices, key=lambda one: int(one.start)):
+        if united and one.start <= united[-1].stop:
+            united[-1] = slice(united[-1].start, max(united[-1].stop, one.stop))
+        else:
+            united.append(one)
+    return united
 
 
 def _by_scipy(free: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:

@@ -66,13 +66,14 @@ class Tree(Plottable):
         parents = np.arange(-1, len(edge_costs) - 1, dtype=np.int32)
         return cls(path.radius, path.waypoints, parents, np.cumsum(edge_costs), path.words, path.lengths, edge_costs)
 
-    def after(self, path: Path) -> "Tree":
-        """Return the tree with a path in front of it, which leads to its root."""
+    def after(self, path: Path, edge_costs: np.ndarray) -> "Tree":
+        """Return the tree with a path in front of it, which leads to its root, given the (n,) costs of the path's curves."""
         before = len(path.words) - 1
         parents = np.append(np.arange(-1, before), np.where(self.parents[1:] < 0, -1, self.parents[1:] + before)).astype(np.int32)
         poses, words, lengths = (np.concatenate([ahead, own[1:]]) for ahead, own in (
             (path.waypoints, self.poses), (path.words, self.words), (path.lengths, self.lengths)))
-        return Tree(self.radius, poses, parents, _costs(parents, lengths), words, lengths)
+        edge_costs = np.concatenate([[0.0], edge_costs, self.edge_costs[1:]])
+        return Tree(self.radius, poses, parents, _costs(parents, edge_costs), words, lengths, edge_costs)
 
     def __len__(self) -> int:
         return len(self.parents)
@@ -155,13 +156,13 @@ class Tree(Plottable):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
 
 
-def _costs(parents: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def _costs(parents: np.ndarray, edge_costs: np.ndarray) -> np.ndarray:
     """Return the (n,) costs of nodes, each its parent's and that of its edge."""
-    edges, costs = edge_costs(lengths), np.zeros(len(parents))
+    costs = np.zeros(len(parents))
     known = parents < 0
     while not known.all():
         new = ~known & known[parents]
-        costs[new] = costs[parents[new]] + edges[new]
+        costs[new] = costs[parents[new]] + edge_costs[new]
         known |= new
     return costs
 
