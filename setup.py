@@ -58,6 +58,8 @@ setup(
         installed("", "package.xml"),
         installed("maps", "maps/*"),
         installed("config", "config/*"),
+        installed("launch", "launch/*"),
+        installed("examples", "examples/*"),
         # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
         (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt_planner", "resource/dubins_rrt"]),
     ],

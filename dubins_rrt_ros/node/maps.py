@@ -65,7 +65,11 @@ class Maps:
         self._last_world: World | None = None  # that was prepared; the worker's own
         self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED) if self._options.map_file else None
         if self._options.map_file:
-            self.take(*self._load_first(self._options.map_file))
+            try:
+                self.take(*self._load_first(self._options.map_file))
+            except MapError:
+                self._worker.close(0.0)
+                raise
         else:
             qos = LATCHED if self._options.map_transient_local else VOLATILE
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
@@ -180,6 +184,7 @@ class Maps:
 
     def close(self) -> None:
         """End the thread; a preparation under way cannot be cancelled and ends with the process."""
+        self._node.remove_post_set_parameters_callback(self._on_parameters)
         self._worker.close(0.0)
 
     def _on_map(self, message: OccupancyGrid) -> None:

@@ -1,11 +1,14 @@
 """What Nav2 asks of a planner: the interfaces of its planner_server, where nav2_msgs is installed."""
 
-from rclpy.callback_groups import CallbackGroup
-from rclpy.node import Node
+from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
+
+from .conversions import filled
 from .dispatcher import Dispatcher
 from .executor_queue import ExecutorQueue
 from .frames import Frames
+from .managed_node import ManagedNode
 from .maps import Maps
 from .nav2_action import PathAction, PathServer
 from .nav2_validity import PathValidity
@@ -15,7 +18,7 @@ from .readiness import Readiness
 
 try:
     from nav2_msgs.action import ComputePathThroughPoses, ComputePathToPose
-    from nav2_msgs.srv import IsPathValid
+    from nav2_msgs.srv import ClearEntireCostmap, IsPathValid
 except ImportError:  # part of an installation of ROS, not of the packages for pip
     IsPathValid = None
     ACTIONS: tuple[PathAction, ...] = ()
@@ -27,7 +30,7 @@ else:
 class Nav2:
     """Serves actions and service as Nav2's planner_server does, or logs once that they are not there, and why."""
 
-    def __init__(self, node: Node, parameters: Parameters, maps: Maps, readiness: Readiness, frames: Frames,
+    def __init__(self, node: ManagedNode, parameters: Parameters, maps: Maps, readiness: Readiness, frames: Frames,
                  dispatcher: Dispatcher, outputs: Outputs, queue: ExecutorQueue, group: CallbackGroup):
         self._actions = [PathServer(node, action, parameters, dispatcher, readiness, frames, outputs, group)
                          for action in ACTIONS]
@@ -35,3 +38,15 @@ class Nav2:
             node.get_logger().info("Without nav2_msgs there are no actions for Nav2; to have them install ros-jazzy-nav2-msgs")
         else:
             self._validity = PathValidity(node, IsPathValid, parameters, maps, readiness, dispatcher, queue, group)
+            if parameters.read().node.clear_costmap_service:
+                node.create_service(ClearEntireCostmap, "global_costmap/clear_entirely_global_costmap", _clear_nothing)
+
+    def close(self) -> None:
+        """End the actions."""
+        for action in self._actions:
+            action.close()
+
+
+def _clear_nothing(request: Any, response: Any) -> Any:
+    """Answer Nav2's default behaviour trees, which clear the costmap before they plan again: there is none."""
+    return filled(response, success=True)

@@ -9,7 +9,6 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMessage
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import CallbackGroup
-from rclpy.node import Node
 
 from dubins_rrt_ros.planning import Plan, Status
 from dubins_rrt_ros.planning.text import quoted_name
@@ -17,6 +16,7 @@ from dubins_rrt_ros.planning.text import quoted_name
 from .conversions import duration_message, filled
 from .dispatcher import Dispatcher
 from .frames import Frames
+from .managed_node import ManagedNode
 from .nav2_goals import Goal, Goals
 from .outcome import Outcome
 from .outputs import Outputs
@@ -63,8 +63,8 @@ class PathAction:
 class PathServer:
     """Serves such an action, in a worker of its own, so that its goals disturb no other request."""
 
-    def __init__(self, node: Node, action: PathAction, parameters: Parameters, dispatcher: Dispatcher, readiness: Readiness,
-                 frames: Frames, outputs: Outputs, group: CallbackGroup):
+    def __init__(self, node: ManagedNode, action: PathAction, parameters: Parameters, dispatcher: Dispatcher,
+                 readiness: Readiness, frames: Frames, outputs: Outputs, group: CallbackGroup):
         self._node, self._action, self._parameters, self._dispatcher = node, action, parameters, dispatcher
         self._readiness, self._frames, self._outputs = readiness, frames, outputs
         self._worker = dispatcher.new_worker(action.name)
@@ -75,8 +75,12 @@ class PathServer:
             handle_accepted_callback=self._on_accepted, cancel_callback=self._on_cancel, goal_service_qos_profile=SERVICE,
             result_service_qos_profile=SERVICE, cancel_service_qos_profile=SERVICE, result_timeout=RESULT_TIMEOUT)
 
+    def close(self) -> None:
+        """Take no more goals."""
+        self._server.destroy()
+
     def _on_goal(self, request: Any) -> GoalResponse:
-        return GoalResponse.ACCEPT
+        return GoalResponse.ACCEPT if self._node.is_active else GoalResponse.REJECT
 
     def _on_accepted(self, handle: Any) -> None:
         goal = self._by_id[_id(handle)] = Goal(handle)

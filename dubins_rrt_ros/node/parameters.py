@@ -53,6 +53,9 @@ class NodeOptions:
                                     low=0.0, high=1e6)
     goal_reached_yaw: float = option(0.5, "heading error within which it is", unit="rad", low=0.0, high=math.pi)
     planner_ids: tuple[str, ...] = option(("GridBased",), "names by which Nav2's actions may ask for this planner")
+    clear_costmap_service: bool = option(False, "answer global_costmap/clear_entirely_global_costmap, for which Nav2's default "
+                                                "behaviour trees ask; there is nothing to clear")
+    managed: bool = option(False, "be a lifecycle node, for a manager without bonds (bond_timeout 0.0)")
     check_invariants: bool = option(False, "for debugging: check the invariants of every answer, its path and its tree before "
                                            "it is published, which is slow")
 
@@ -94,7 +97,7 @@ _RESTART = "start the node again with another value"
 #: Parameters that cannot be changed at run time, and what to do instead. They shape topics, where a change would have no
 #: effect, or limit what anyone on the network may do.
 READ_ONLY = {"map_file": f"load another map by ~/load_map, or {_RESTART}", "map_directory": _RESTART, "global_frame": _RESTART,
-             "map_transient_local": _RESTART}
+             "map_transient_local": _RESTART, "clear_costmap_service": _RESTART, "managed": _RESTART}
 
 
 class Parameters:

@@ -1,11 +1,10 @@
 """The planner node: wiring. Messages go to the objects below, and workers plan."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -15,6 +14,7 @@ from .dispatcher import Dispatcher
 from .executor_queue import ExecutorQueue, steady_timer
 from .frames import Frames
 from .goal_session import GoalSession
+from .managed_node import ManagedNode
 from .map_services import MapServices
 from .maps import Maps
 from .nav2 import Nav2
@@ -27,11 +27,14 @@ from .qos import SERVICE, VOLATILE
 from .readiness import Readiness
 from .start_topics import StartTopics
 
+#: A part of the node that is to be closed.
+Part = TypeVar("Part", ExecutorQueue, Maps, PathCheck, Dispatcher, Nav2)
+
 #: Time between two log lines on what is missing [s].
 REMINDER_INTERVAL = 5.0
 
 
-class PlannerNode(Node):
+class PlannerNode(ManagedNode):
     """Plans from the last start to each goal that comes, and between the poses of a service's request.
 
     Raises:
@@ -42,19 +45,28 @@ class PlannerNode(Node):
     def __init__(self, **kwargs: Any):
         super().__init__("planner", **kwargs)
         self._parameters_in_use = Parameters(self)
-        parameters, frame = self._parameters_in_use, self._parameters_in_use.read().node.global_frame
+        self._parts: list[ExecutorQueue | Maps | PathCheck | Dispatcher | Nav2] = []
         self._warn()
-        self._queue = ExecutorQueue(self)
+        self.begin(self._parameters_in_use.read().node.managed)
+
+    def set_up(self) -> None:
+        """Make all that publishes, listens and plans."""
+        parameters, frame = self._parameters_in_use, self._parameters_in_use.read().node.global_frame
+        self._queue = self._to_be_closed(ExecutorQueue(self))
         self._outputs = Outputs(self, parameters, frame)
         self._frames = Frames(self, parameters, frame)
-        self._maps = Maps(self, parameters, self._queue, self._on_map_news, self._on_map_prepared)
+        self._maps = self._to_be_closed(Maps(self, parameters, self._queue, self._on_map_news, self._on_map_prepared))
         self._readiness = Readiness(self, parameters, self._maps, self._outputs, self._frames)
-        self._dispatcher = Dispatcher(self, parameters, self._maps, self._queue)
-        self._path_check = PathCheck(self, parameters, self._maps, self._outputs, self._queue)
+        self._dispatcher = self._to_be_closed(Dispatcher(self, parameters, self._maps, self._queue))
+        self._path_check = self._to_be_closed(PathCheck(self, parameters, self._maps, self._outputs, self._queue))
         self._session = GoalSession(self, parameters, self._dispatcher, self._readiness, self._frames, self._outputs,
                                     self._path_check)
         self._readiness.update()
         self._listen()
+
+    def _to_be_closed(self, part: Part) -> Part:
+        self._parts.append(part)
+        return part
 
     def _warn(self) -> None:
         for warning in (*self._parameters_in_use.unknown(), *self._parameters_in_use.overridden()):
@@ -75,8 +87,8 @@ class PlannerNode(Node):
         # In the default group a service that awaits would keep everything else waiting.
         group = ReentrantCallbackGroup()
         self._plan_service = PlanService(self, self._dispatcher, self._readiness, self._frames, self._outputs, group)
-        self._nav2 = Nav2(self, self._parameters_in_use, self._maps, self._readiness, self._frames, self._dispatcher,
-                          self._outputs, self._queue, group)
+        self._to_be_closed(Nav2(self, self._parameters_in_use, self._maps, self._readiness, self._frames, self._dispatcher,
+                                self._outputs, self._queue, group))
         self._map_services = MapServices(self, self._parameters_in_use, self._maps, self._readiness, self.report_defect, group)
         self.create_service(Trigger, "~/cancel", self._on_cancel, qos_profile=SERVICE, callback_group=group)
         steady_timer(self, REMINDER_INTERVAL, self._on_reminder)
@@ -94,14 +106,20 @@ class PlannerNode(Node):
 
     def close(self) -> None:
         """End the workers; nothing is published afterwards."""
-        self._queue.close()
-        self._maps.close()
-        self._path_check.close()
-        self._dispatcher.close()
+        for part in self._parts:
+            part.close()
+        self._parts.clear()
+
+    def cancel_requests(self) -> None:
+        """End all requests, as the service does."""
+        self._session.cancel()
+        self._dispatcher.cancel_all()
 
     def report_defect(self, error: Exception) -> None:
         """Report an exception that belongs to no request."""
-        self._outputs.report(outcome_of(error, self), map_id=self._readiness.map_id)
+        outcome = outcome_of(error, self)
+        if self._parts:
+            self._outputs.report(outcome, map_id=self._readiness.map_id)
 
     def _on_map_news(self) -> None:
         self._readiness.update()

@@ -1,10 +1,9 @@
 """The node's needs before it can plan: which are missing, why, and what would provide them."""
 
-from rclpy.node import Node
-
 from dubins_rrt_ros.planning import Map, Pose, Status
 
 from .frames import Frames
+from .managed_node import ManagedNode
 from .maps import Maps
 from .outcome import Outcome
 from .outputs import Outputs
@@ -25,7 +24,7 @@ class Readiness:
         start: the last one by topic, in the global frame; None until one has come that could be used and transformed.
     """
 
-    def __init__(self, node: Node, parameters: Parameters, maps: Maps, outputs: Outputs, frames: Frames):
+    def __init__(self, node: ManagedNode, parameters: Parameters, maps: Maps, outputs: Outputs, frames: Frames):
         self._node, self._parameters, self._maps, self._outputs, self._frames = node, parameters, maps, outputs, frames
         self.start: Pose | None = None
         self._start_refusal = ""  # why the last start was refused
@@ -39,8 +38,10 @@ class Readiness:
         """Return the newest map.
 
         Raises:
-            Refusal: there is none.
+            Refusal: there is none, or the node is not active.
         """
+        if not self._node.is_active:
+            raise Refusal(Status.UNKNOWN, "The planner is not active; its lifecycle manager has to activate it first.")
         if self._maps.map is None:
             raise Refusal(Status.NO_MAP, self.missing_map())
         return self._maps.map

@@ -49,6 +49,8 @@ PARAMETERS = {
     "publish_tree": (BOOL, None, "no"),
     "replan_on_map_change": (BOOL, None, "no"),
     "map_transient_local": (BOOL, None, "no"),
+    "managed": (BOOL, False, "no"),
+    "clear_costmap_service": (BOOL, False, "no"),
     "planner_ids": (STRINGS, ["GridBased"], "GridBased"),
     "max_map_cells": (INTEGER, None, 0),
 }

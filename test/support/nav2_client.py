@@ -33,9 +33,13 @@ class PathClient:
 
     def accepted(self, message):
         """Send a goal as it is; the handle of it once it is accepted."""
-        handle = self.answer(self._action.send_goal_async(message))
+        handle = self.handle(message)
         assert handle.accepted
         return handle
+
+    def handle(self, message):
+        """Send a goal as it is; the handle of it, accepted or not."""
+        return self.answer(self._action.send_goal_async(message))
 
     def result(self, handle):
         """How a goal ended, and its result."""

@@ -1,0 +1,97 @@
+"""A node that a lifecycle manager, such as Nav2's, may bring up and take down."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
+
+from dubins_rrt_ros.planning.errors import PlanningError
+
+
+class ManagedNode(LifecycleNodeMixin, Node, ABC):
+    """A node whose parts are made at once or, where it is managed, when it is configured.
+
+    Subclasses make their parts in `set_up`, end them in `close`, and take requests while `is_active`. While it is managed, an
+    error of ours in `set_up` leaves it unconfigured, to be tried again.
+
+    Attributes:
+        is_active: True if it is not managed, or its manager has activated it.
+    """
+
+    def __init__(self, name: str, **kwargs: Any):
+        Node.__init__(self, name, **kwargs)
+        self.is_active = False
+        self._without_parts: set[int] = set()  # what the node has before it is set up
+
+    @abstractmethod
+    def set_up(self) -> None:
+        """Make all parts."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End what the parts do, as many as there are."""
+
+    @abstractmethod
+    def cancel_requests(self) -> None:
+        """End all requests."""
+
+    def begin(self, managed: bool) -> None:
+        """Set up and be active, or wait for a lifecycle manager."""
+        if managed:
+            LifecycleNodeMixin.__init__(self)
+            self.get_logger().info("Unconfigured: waiting for a lifecycle manager")
+        else:
+            self.set_up()
+            self.is_active = True
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Set up."""
+        self._without_parts = {id(entity) for entity, _ in self._entities()}
+        try:
+            self.set_up()
+        except PlanningError as error:
+            self.get_logger().error(f"Not configured: {error}")
+            self._take_down()
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take requests from now on."""
+        self.is_active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take no requests, and end those under way."""
+        self.is_active = False
+        self.cancel_requests()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Be as before it was set up."""
+        self._take_down()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take down what there is."""
+        self.is_active = False
+        self._take_down()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take down what there is after a defect in another transition, so that it can be configured again."""
+        return self.on_shutdown(state)
+
+    def _take_down(self) -> None:
+        self.close()
+        for entity, destroy in self._entities():
+            if self._without_parts and id(entity) not in self._without_parts:
+                destroy(entity)
+
+    def _entities(self) -> list[tuple[Any, Callable[[Any], Any]]]:
+        """Return all publishers and the like, each with the function that destroys it."""
+        kinds = ((self.publishers, self.destroy_publisher), (self.subscriptions, self.destroy_subscription),
+                 (self.services, self.destroy_service), (self.timers, self.destroy_timer),
+                 (self.guards, self.destroy_guard_condition))
+        return [(entity, destroy) for entities, destroy in kinds for entity in entities]
