@@ -21,6 +21,10 @@ def never() -> bool:
     return False
 
 
+def unlimited() -> None:
+    """Let work go on, however long it takes, where `Deadline.check` would end it."""
+
+
 class Deadline:
     """The end of a request's time.
 

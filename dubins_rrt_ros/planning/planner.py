@@ -42,7 +42,7 @@ AUDIT_INTERVAL = 5
 #: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
 AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
 #: Share of the time, and maximum time [s], that is kept to tell why there is no path.
-REASONS_SHARE, MOST_FOR_REASONS = 0.05, 0.05
+REASONS_SHARE, MOST_FOR_REASONS = 0.1, 0.1
 #: A block of memory that is larger than any array of most requests [bytes].
 LARGE_BLOCK = 1 << 24
 
@@ -147,7 +147,7 @@ class _Call:
         field = self._prepared_world().field
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
-        if diagnosis := explain.before_search(self._problem, field):
+        if diagnosis := explain.before_search(self._problem, field, self._deadline.check):
             if diagnosis.status == Status.START_OCCUPIED and self._problem.start_slack > 0:
                 return self._leave_start(field, diagnosis.message)
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
+from dubins_rrt_ros.cli.bench import deadlines
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.planning import PolygonMap, Problem, Settings, Vehicle, load_map, plan, rasterise, save_map
 from dubins_rrt_ros.planning.maps.locate import maps_directory
@@ -249,3 +250,23 @@ def test_ctrl_c_keeps_the_lines_that_are_written(jobs):
     assert process.returncode == 130 and out == "" and error == "dubins_rrt bench: interrupted\n"
     line, = Path("runs.jsonl").read_text().splitlines()
     assert json.loads(line)["problem"] == "hall" and json.loads(line)["solved"]
+
+
+def test_deadlines_are_measured_on_maps_of_its_own(monkeypatch, capsys):
+    monkeypatch.setattr(deadlines, "VEHICLES", {"maze": {"disc": deadlines.DISC}})
+    monkeypatch.setattr(deadlines, "LIMITS", (0.02, 0.05))
+    assert main(["bench", "--deadlines", "--seeds", "2", "--out", "runs.jsonl"]) == 0
+    lines = [json.loads(line) for line in Path("runs.jsonl").read_text().splitlines()]
+    assert len(lines) == deadlines.number_of_requests(2) == 12
+    assert {line["problem"] for line in lines} == {"maze disc open", "maze disc walled", "maze disc tight"}
+    for line in lines:
+        assert line["over_s"] == pytest.approx(line["total_s"] - line["time_limit"])
+        assert line["cpu_over_s"] == pytest.approx(line["cpu_s"] - line["time_limit"])
+        assert line["problem"] != "maze disc walled" or line["error_name"] == "NO_VALID_PATH"
+    out = capsys.readouterr().out
+    assert "| problem | limit [s] | solved | p50 over, wall [ms] |" in out and "| maze disc tight | 0.05 | 0/2 |" in out
+
+
+def test_deadlines_take_no_problems(capsys):
+    file = problems(entry())
+    assert "--deadlines has problems of its own" in refusal(file, "--deadlines", "--out", "runs.jsonl", capsys=capsys)

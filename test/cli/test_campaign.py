@@ -110,7 +110,7 @@ def test_a_collision_check_that_is_too_strict_is_found(monkeypatch):
     (Status.UNKNOWN, "A defect.", "UNKNOWN: A defect."),
 ])
 def test_a_false_status_is_found(status, message, finding, monkeypatch):
-    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Diagnosis(status, message))
+    monkeypatch.setattr(reasons, "before_search", lambda *_: Diagnosis(status, message))
     assert finding in " ".join(findings_of(walled_trial(), monkeypatch))
 
 
@@ -119,7 +119,7 @@ def test_a_pose_that_should_have_been_refused_is_found(name, pose, monkeypatch):
     trial = walled_trial()
     trial = replace(trial, problem=replace(trial.problem, **{name: pose}))
     assert findings_of(trial, monkeypatch) == []
-    monkeypatch.setattr(reasons, "before_search", lambda problem, field: Diagnosis(Status.NO_VALID_PATH, "No path exists: x."))
+    monkeypatch.setattr(reasons, "before_search", lambda *_: Diagnosis(Status.NO_VALID_PATH, "No path exists: x."))
     assert f"NO_VALID_PATH, but at the {name} the vehicle has no room: -0.4" in " ".join(findings_of(trial, monkeypatch))
 
 
@@ -132,7 +132,7 @@ def test_what_the_maker_of_a_problem_knows_counts(monkeypatch):
 
 
 def test_an_exception_is_found_and_told_with_the_command_that_repeats_it(monkeypatch, capsys):
-    def fail(problem, field):
+    def fail(*_):
         raise ZeroDivisionError("planted")
 
     monkeypatch.setattr(planner.explain, "before_search", fail)

@@ -30,6 +30,12 @@ START, GOAL = (-8.0, -8.0, 0.0), (8.0, 8.0, 1.0)
 TURNED = (3.0, -2.0, 0.7)
 
 
+@pytest.fixture(autouse=True)
+def reasons_have_time(monkeypatch):
+    """However slow the machine is; `test_planner_limits.py` tests that they look at the time."""
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.AUDIT_GRACE", 600.0)
+
+
 def walls_with_a_gap(gap, value=100, resolution=0.5, origin=(-10.0, -10.0, 0.0)):
     """A square of 20 m with a wall a metre thick in its middle that leaves some rows free."""
     n = round(20 / resolution)
@@ -175,7 +181,7 @@ def test_large_grids_are_coarsened_to_the_safe_side(monkeypatch):
     radius = float(re.search(r"with radius ([\d.]+) m instead", why(problem).message)[1])
     assert 0.3 < radius < 0.75
     grid = boxes_grid(np.random.default_rng(3), unknown=True)
-    coarse = passage_module._coarsened(grid, 4)
+    coarse = passage_module._coarsened(grid, 4, lambda: None)
     assert coarse.data.shape == (10, 12)
     points = np.random.default_rng(4).uniform(grid.corners().min(axis=0), grid.corners().max(axis=0), (2000, 2))
     for allow_unknown in (False, True):

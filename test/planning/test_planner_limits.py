@@ -7,7 +7,7 @@ import pytest
 from support.cases import SCALE, empty_map, needs_compiled
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
-from dubins_rrt_ros.planning import GridMap, Problem, Status, Tree, audit_path, plan, prepare
+from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, plan, prepare
 from dubins_rrt_ros.planning.search.smoothing import smooth
 
 
@@ -203,3 +203,34 @@ def test_progress_of_rrt_has_one_path():
     told = []
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt"), on_progress=told.append)
     assert [progress.length for progress in told if progress.improved] == [pytest.approx(result.length)]
+
+
+def test_the_reasons_look_at_the_time(monkeypatch):
+    """A clock that moves on by a millisecond with each look ends them in the middle; the proof stands without its figures."""
+    grid = np.zeros((2000, 2000), np.int8)
+    grid[:, 1000:1010] = 100
+    problem = Problem(prepare(GridMap(grid, 0.01, (-10.0, -10.0, 0.0)), VEHICLE), start=START, goal=GOAL)
+    now = iter(np.arange(1e6) / 1000)
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda: next(now))
+    for limit, words in ((0.02, "allow more time to be told where"), (10.0, "no robot_radius is small enough")):
+        result = plan(problem, settings("rrt_star", planning_time=limit))
+        assert_refused(result, Status.NO_VALID_PATH, "walls", words)
+        assert result.planning_time < limit + 0.01
+
+
+@needs_compiled
+def test_smoothing_looks_at_the_time_before_the_first_change():
+    """Where a path has very many poses, of which most are not needed."""
+    grid_map, looks = empty_map(), []
+    field = prepare(grid_map, VEHICLE).field
+    xs = np.linspace(-8.0, 8.0, 20_000)
+    path = Path(np.column_stack([xs, np.zeros_like(xs), np.zeros_like(xs)]), np.zeros(len(xs), np.int8),
+                np.column_stack([np.zeros_like(xs), np.full_like(xs, xs[1] - xs[0]), np.zeros_like(xs)]), 0.5)
+
+    def look():
+        looks.append(0)
+        return len(looks) > 3
+
+    smoothed = smooth(path, VEHICLE, field, np.random.default_rng(1), True, look)
+    assert 1000 < len(smoothed.words) < len(path.words)
+    assert smoothed.length == pytest.approx(16.0)

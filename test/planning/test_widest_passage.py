@@ -36,7 +36,10 @@ def test_the_search_finds_the_widest_passage(seed):
     is_target[tuple(np.transpose(targets))] = 1
     search = WidestPathSearch(clearance=ClearanceField(map).kernel, first=first.tolist(), along=step.tolist(), shape=shape,
                               is_target=is_target.ravel(), least=least, enough=enough)
-    found, passage = search.widest_path(start[0] * shape[1] + start[1])
+    search.begin(start[0] * shape[1] + start[1])
+    while search.run(int(rng.integers(1, 20))):
+        pass
+    found, passage = search.widest_path()
     assert found == pytest.approx(naive.widest(np.where(clearance > least, clearance, 0), start, targets), abs=1e-9)
     if found == 0:
         assert len(passage) == 0

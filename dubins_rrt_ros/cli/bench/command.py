@@ -15,6 +15,7 @@ from ..common.flags import add_option_flags, add_paper_flag, given_settings, lar
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
+from . import deadlines
 from .problems import Case, chosen, read_cases
 from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
@@ -39,7 +40,7 @@ class _Flags(Settings):
 def add_arguments(parser: Parser) -> None:
     """Give the parser the flags and the help of the command."""
     describe(
-        parser, usage="(PROBLEMS.json --out FILE | --report FILE [FILE ...]) [options]",
+        parser, usage="(PROBLEMS.json --out FILE | --deadlines --out FILE | --report FILE [FILE ...]) [options]",
         description="Plans every problem of a file with several seeds and writes a line of JSON for each run, as soon as it is "
                     "done; or, with --report, compares the runs in such files.",
         notes="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
@@ -71,6 +72,10 @@ def _add_measuring(group: argparse._ArgumentGroup) -> None:
                        help=f"time limit of a run [s]; default {DEFAULT_TIME:g}, or none if --samples is given")
     group.add_argument("--jobs", metavar="N", type=int,
                        help="number of processes; default 1, since processes that share cores distort each other's timings")
+    group.add_argument("--deadlines", action="store_true",
+                       help="measure in place of PROBLEMS.json by how much answers exceed planning times of 0.05 to 1 s: a disc, "
+                            "a star of 100 corners and a truck in the maze, in halls and among blocks, with goals that can be "
+                            f"reached and goals that cannot; --seeds N requests each, default {deadlines.REQUESTS}")
     group.add_argument("--label", metavar="NAME", help="name of these runs in a report; default: the planner")
 
 
@@ -110,6 +115,8 @@ def _flags(names: Iterable[str]) -> str:
 
 
 def _measure(arguments: argparse.Namespace) -> int:
+    if getattr(arguments, "deadlines", False):
+        return _measure_deadlines(arguments)
     planned, jobs = _planned_runs(arguments), _count(arguments, "jobs")
     lines = []
     with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(measure_all(planned, jobs)) as measured:
@@ -121,6 +128,23 @@ def _measure(arguments: argparse.Namespace) -> int:
     _write_json(arguments.json, runs, best_known(runs, {}))
     print(summary(runs), file=words_for(arguments.json))
     return 0 if all(line["solved"] for line in lines) else 1
+
+
+def _measure_deadlines(arguments: argparse.Namespace) -> int:
+    """Time the answers to requests on maps of its own, and print by how much they exceed the planning time."""
+    if "out" not in arguments or "file" in arguments:
+        raise UsageError("--deadlines has problems of its own, so leave PROBLEMS.json out; --out must be given")
+    count = _count(arguments, "seeds", default=deadlines.REQUESTS)
+    asked = deadlines.requests(count, _settings(arguments, {"samples": Settings.samples}))
+    lines = []
+    with open(arguments.out, "w", encoding="utf-8") as out:
+        for line in with_bar(deadlines.measure(asked), deadlines.number_of_requests(count), " requests"):
+            out.write(json.dumps(line, allow_nan=False) + "\n")
+            lines.append(line)
+    if arguments.json:
+        write_document(arguments.json, {"overruns": lines})
+    print(deadlines.overruns(lines), file=words_for(arguments.json))
+    return 0
 
 
 def _planned_runs(arguments: argparse.Namespace) -> list[BenchRun]:
@@ -151,8 +175,8 @@ def _settings(arguments: argparse.Namespace, of_problem: Mapping[str, Any]) -> S
     return Settings(**{"samples": MAX_SAMPLES, "planning_time": default_time, **given})
 
 
-def _count(arguments: argparse.Namespace, name: str) -> int:
-    count = getattr(arguments, name, 1)
+def _count(arguments: argparse.Namespace, name: str, default: int = 1) -> int:
+    count = getattr(arguments, name, default)
     if count < 1:
         raise UsageError(f"--{name} is {count}; give 1 or more")
     return count

@@ -28,6 +28,8 @@ cdef class Shortcutter:
     cdef double[:, ::1] new_lengths
     cdef double[::1] new_costs
     cdef double rest_cost
+    # The pose from which the first clearing goes on.
+    cdef int clearing
     cdef void try_change(self, bint direct, double where, double back, double ahead, double across, double turn) noexcept nogil
     cdef void try_shortcut(self, double begin, double end) noexcept nogil
     cdef void try_perturbation(self, double begin, double middle, double end, double fine, double across,
@@ -47,6 +49,7 @@ cdef class Shortcutter:
     cdef void come_back(self, double s) noexcept nogil
     cdef void put_in(self, int tail) noexcept nogil
     cdef void clear(self) noexcept nogil
+    cdef void clear_some(self, int checks) noexcept nogil
     cdef void move_tail(self, int begin, int to) noexcept nogil
     cdef void copy(self, int pose, int to) noexcept nogil
     cdef void measure_from(self, int first) noexcept nogil

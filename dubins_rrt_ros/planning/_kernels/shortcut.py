@@ -47,6 +47,8 @@ FINENESS = cython.declare(cython.double, 7)
 TRIES_PER_CLEARING = cython.declare(cython.int, 64)
 #: Share of the perturbations that move a pose between its neighbours.
 VERTEX_SHARE = cython.declare(cython.double, 0.7)
+#: A number of checks that is not limited.
+ALL = cython.declare(cython.int, 2_147_483_647)
 #: Maximum number of curves in a change: the first part of the curve on which it leaves the path, and two of a perturbation.
 MAX_NEW = 3
 
@@ -93,6 +95,13 @@ class Shortcutter:
         self.new_poses, self.new_lengths = np.empty((2, MAX_NEW, 3))
         self.new_words = np.empty(MAX_NEW, np.int8)
         self.measure_from(1)
+        self.clearing = 1
+
+    def prepare(self, checks: cython.int) -> bool:
+        """Do some of what `improve` does before the first change; return True while some is left."""
+        with cython.nogil:
+            self.clear_some(checks)
+        return self.clearing < self.count - 1
 
     def improve(self, draws: cython.double[:, ::1], begin: cython.int, end: cython.int, shortcuts: cython.double):
         """Try a change for each of the rows from `begin` to `end` of (n, 6) draws, four uniform in [0, 1) and two normal.
@@ -103,7 +112,7 @@ class Shortcutter:
         i: cython.int
         with cython.nogil:
             if begin == 0:
-                self.clear()
+                self.clear_some(ALL)
             for i in range(begin, end):
                 self.try_change(draws[i, 0] < shortcuts, draws[i, 1], draws[i, 2], draws[i, 3], draws[i, 4], draws[i, 5])
                 if (i + 1) % TRIES_PER_CLEARING == 0:
@@ -279,9 +288,15 @@ class Shortcutter:
 
     def clear(self):
         """Remove the poses whose neighbours are joined by a free curve that costs no more than the path over them."""
-        pose: cython.int = 1
+        self.clearing = 1
+        self.clear_some(ALL)
+
+    def clear_some(self, checks):
+        """Go on with that, for so many curves."""
+        pose: cython.int = self.clearing
         limit: cython.double
-        while pose < self.count - 1:
+        while pose < self.count - 1 and checks > 0:
+            checks -= 1
             self.leave_pose(pose - 1, self.pose_of(pose - 1))
             limit = self.ends[pose + 1] - self.ends[pose - 1] + LEAST_GAIN
             limit += self.excess_between(self.ends[pose], self.ends[pose + 1])
@@ -290,6 +305,7 @@ class Shortcutter:
                 self.put_in(pose + 2)
             else:
                 pose += 1
+        self.clearing = pose
 
     def move_tail(self, begin, to):
         """Move the poses from `begin` on so that they begin at `to`."""

@@ -17,6 +17,8 @@ cdef class WidestPathSearch:
     cdef signed char[::1] entered
     cdef int[::1] queue
     cdef int queued
+    cdef int served
+    cdef int target
     cdef Heap heap
-    cdef int flood(self, int start) noexcept nogil
+    cdef int flood(self, int nodes) noexcept nogil
     cdef void enter(self, int node, signed char how) noexcept nogil

@@ -48,29 +48,37 @@ class WidestPathSearch:
         nodes = self.rows * self.columns
         self.entered = np.zeros(nodes, np.int8)
         self.queue, self.heap = np.empty(nodes, np.int32), Heap(nodes)
-        self.queued = 0
+        self.queued = self.served = 0
+        self.target = -1
 
-    def widest_path(self, start: cython.int):
+    def begin(self, start: cython.int):
+        """Begin the flood at a node."""
+        with cython.nogil:
+            self.enter(start, START)
+
+    def run(self, nodes: cython.int) -> bool:
+        """Flood over that many nodes; return True while the flood goes on."""
+        with cython.nogil:
+            self.target = self.flood(nodes)
+        return self.target < 0 and (self.served < self.queued or self.heap.count > 0)
+
+    def widest_path(self):
         """Return the least clearance on the widest path [m], at most `enough`, and the nodes of the path as (n,) int32.
 
-        Where no target can be reached, these are 0 and empty.
+        Where no target was reached, these are 0 and empty.
         """
-        target: cython.int
-        with cython.nogil:
-            target = self.flood(start)
-        return (self.level, self.nodes_to(target)) if target >= 0 else (0.0, np.empty(0, np.int32))
+        return (self.level, self.nodes_to(self.target)) if self.target >= 0 else (0.0, np.empty(0, np.int32))
 
-    def flood(self, start):
-        """Flood from `start` until a target is reached; return that, or -1."""
+    def flood(self, nodes):
+        """Flood over that many nodes, or until a target is reached; return that, or -1."""
         node: cython.int
         row: cython.int
         column: cython.int
-        served: cython.int = 0
-        self.enter(start, START)
-        while served < self.queued or self.heap.count > 0:
-            if served < self.queued:
-                node = self.queue[served]
-                served += 1
+        while nodes > 0 and (self.served < self.queued or self.heap.count > 0):
+            nodes -= 1
+            if self.served < self.queued:
+                node = self.queue[self.served]
+                self.served += 1
             else:
                 self.level = -self.heap.least_key()
                 node = self.heap.pop()

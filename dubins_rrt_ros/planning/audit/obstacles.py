@@ -19,6 +19,8 @@ MARGIN, TILE = 64, 8
 ROWS_AT_ONCE = 1_000_000
 #: Side of the squares in which cells along the path of a polygon are read [cells].
 BLOCK = 32
+#: Least distance within which shapes are sought, which must not be 0.
+TINY = 1e-12
 #: Number of runs of blocks that are read at once.
 RUNS_AT_ONCE = 64
 
@@ -39,20 +41,21 @@ class PolygonObstacles:
         """Return the distances of points from the obstacles [m]; 0 in one, and never more than `reach` [m]."""
         inside = shapely.contains_xy(self._free, x, y)
         out = np.zeros(len(x))
-        out[inside] = _to_nearest(self._tree, shapely.points(x[inside], y[inside]))
-        return np.minimum(out, reach)
+        out[inside] = _to_nearest(self._tree, shapely.points(x[inside], y[inside]), reach)
+        return out
 
-    def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
-        """Return the distances of polygons, or of their convex hulls, from the obstacles [m]; 0 where they meet.
+    def shape_distance(self, corners: np.ndarray, hull: bool = False, reach: float = math.inf) -> np.ndarray:
+        """Return the distances of polygons, or of their convex hulls, from the obstacles: 0 where they meet, at most `reach`.
 
         Args:
             corners: (n, c) complex, x + iy [m].
             hull: True for the convex hulls of the corners.
+            reach: maximum distance that matters [m]; it takes much less time where there is nothing as near as that.
         """
         # Where no edge is in a shape, all of it is on the side of the edges that its first corner is on.
         inside = shapely.contains_xy(self._free, corners[:, 0].real, corners[:, 0].imag)
         out = np.zeros(len(corners))
-        out[inside] = _to_nearest(self._tree, _shapes(corners[inside], hull))
+        out[inside] = _to_nearest(self._tree, _shapes(corners[inside], hull), reach)
         return out
 
     def near_path(self, points: np.ndarray, margin: float, reach: float, check_time: Callable[[], None] | None = None
@@ -173,21 +176,25 @@ class PathsideSquares:
             rectangles.append(self._rectangles_in(runs[begin:begin + RUNS_AT_ONCE], allow_unknown))
         self._tree = shapely.STRtree(shapely.box(*np.concatenate(rectangles).T))
 
-    def shape_distance(self, corners: np.ndarray, hull: bool = False) -> np.ndarray:
+    def shape_distance(self, corners: np.ndarray, hull: bool = False, reach: float = math.inf) -> np.ndarray:
         """Return the distances of polygons, or of their convex hulls, from the obstacles: 0 where they meet, at most `reach`.
 
         Args:
             corners: (n, c) complex, x + iy [m].
             hull: True for the convex hulls of the corners.
+            reach: maximum distance that matters [m], at most that of all obstacles along the path; it takes much less time where
+                there is nothing as near as that.
         """
+        reach = min(reach, self.reach)
         place = self._place(corners)
         rows, columns = self._grid.data.shape
         to_edge = np.min([place.real, columns - place.real, place.imag, rows - place.imag], axis=(0, 2))
         out = np.where(to_edge > 0, to_edge, 0.0)
         inside = np.flatnonzero(out)
         if len(self._tree):
-            out[inside] = np.minimum(out[inside], _to_nearest(self._tree, _shapes(place[inside], hull)))
-        return np.minimum(out * self._grid.resolution, self.reach)
+            shapes = _shapes(place[inside], hull)
+            out[inside] = np.minimum(out[inside], _to_nearest(self._tree, shapes, reach / self._grid.resolution))
+        return np.minimum(out * self._grid.resolution, reach)
 
     def _rectangles_in(self, runs: np.ndarray, allow_unknown: bool) -> np.ndarray:
         """Return rectangles as `_rectangles` does, of the cells in runs of blocks, which are laid side by side for it."""
@@ -247,10 +254,13 @@ def _shapes(corners: np.ndarray, hull: bool) -> np.ndarray:
     return np.asarray(shapely.convex_hull(shapely.linestrings(coordinates)) if hull else shapely.polygons(coordinates))
 
 
-def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray) -> np.ndarray:
-    """Return the distances of shapes from the nearest one in a tree."""
-    _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
-    return np.asarray(distance)
+def _to_nearest(tree: shapely.STRtree, shapes: np.ndarray, reach: float) -> np.ndarray:
+    """Return the distances of shapes from the nearest one in a tree, at most `reach`."""
+    out = np.full(len(shapes), reach)
+    (found, _), distance = tree.query_nearest(shapes, max_distance=None if reach == math.inf else max(reach, TINY),
+                                              return_distance=True, all_matches=False)
+    out[found] = np.minimum(distance, reach)
+    return out
 
 
 Obstacles = GridObstacles | PolygonObstacles

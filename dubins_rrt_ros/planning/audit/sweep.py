@@ -37,8 +37,9 @@ PRECISION, SHARE = 1e-3, 0.02
 MOST_PIECES = 4_000_000
 #: Approximate number of pieces that a path is cut into at first, and maximum number of parts that an undecided piece is cut into.
 FIRST_PIECES, PARTS = 48, 12
-#: Maximum number of pieces that are judged at once, for the sake of memory and of the time.
-AT_ONCE = 4096
+#: Maximum number of pieces of a disc that are judged at once, for the sake of memory and of the time, and how many of them take
+#: as long as a piece for each corner of a polygon.
+AT_ONCE, EFFORT = 4096, 2
 #: Number of undecided pieces of a disc's path from which on they are judged by their chords.
 MANY = 1024
 #: Number of cells around a polygon within which obstacles are sought at first.
@@ -182,13 +183,16 @@ class DiscSweep:
 
     Attributes:
         reach: distances are exact up to here, and never more [m].
+        at_once: maximum number of pieces that are judged at once.
     """
+
+    at_once = AT_ONCE
 
     def __init__(self, obstacles: Obstacles, reach: float = math.inf):
         self._obstacles, self.reach = obstacles, reach
 
-    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Return the clearance at poses [m]."""
+    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray, reach: float = math.inf) -> np.ndarray:
+        """Return the clearance at poses [m]; `reach` makes no difference, as the clearance ahead is known by that here."""
         return self._obstacles.distance(x, y, self.reach)
 
     def bound(self, arcs: Arcs, pieces: Pieces, enough: float = math.inf) -> np.ndarray:
@@ -212,15 +216,20 @@ class DiscSweep:
 
 
 class PolygonSweep:
-    """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor."""
+    """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor.
+
+    Attributes:
+        at_once: maximum number of pieces that are judged at once.
+    """
 
     def __init__(self, corners: Sequence[tuple[float, float]], obstacles: PolygonObstacles | PathsideSquares):
         self._corners = np.array([complex(*corner) for corner in corners])
         self._obstacles = obstacles
+        self.at_once = max(2 * PARTS, AT_ONCE // (EFFORT * len(corners)))
 
-    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Return the clearance at poses [m]."""
-        return self._obstacles.shape_distance(self._placed(x, y, theta, self._corners))
+    def clearance(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray, reach: float = math.inf) -> np.ndarray:
+        """Return the clearance at poses, at most `reach` [m]."""
+        return self._obstacles.shape_distance(self._placed(x, y, theta, self._corners), reach=reach)
 
     def bound(self, arcs: Arcs, pieces: Pieces, enough: float = math.inf) -> np.ndarray:
         """Return lower bounds of the clearance on pieces; those above `enough` [m] need not be close."""
@@ -228,26 +237,27 @@ class PolygonSweep:
         # A circle's arc that turns by an angle a has the sagitta r (1 - cos(a / 2)), which is at most r a^2 / 8.
         speed: np.ndarray = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
         sagitta = speed * np.abs(curvature) * pieces.size**2 / 8
-        bounds = self._swept(arcs, pieces, self._corners) - sagitta
+        reach = enough + float(sagitta.max(initial=0.0)) + CONTACT  # so that rounding leaves more than enough
+        bounds = self._swept(arcs, pieces, self._corners, reach) - sagitta
         low = np.flatnonzero(bounds < enough) if len(self._corners) > 1 else np.empty(0, int)
         if len(low):
-            bounds[low] = self._bound_by_edges(arcs, pieces[low]) - sagitta[low]
+            bounds[low] = self._bound_by_edges(arcs, pieces[low], reach) - sagitta[low]
         return np.asarray(np.minimum(pieces.at_begin, bounds))
 
     def parts(self, pieces: Pieces, enough: float) -> np.ndarray:
         """Return the numbers of parts that pieces are cut into, two each, as the error falls with the square of the size."""
         return np.full(len(pieces), 2)
 
-    def _bound_by_edges(self, arcs: Arcs, pieces: Pieces) -> np.ndarray:
-        """Return the least distances of the hulls of the edges."""
+    def _bound_by_edges(self, arcs: Arcs, pieces: Pieces, reach: float) -> np.ndarray:
+        """Return the least distances of the hulls of the edges, at most `reach`."""
         piece, edges = self._edges(arcs.curvature[pieces.index])
-        swept = self._swept(arcs, pieces[piece], edges)
+        swept = self._swept(arcs, pieces[piece], edges, reach)
         return np.asarray(np.minimum.reduceat(swept, np.searchsorted(piece, np.arange(len(pieces)))))
 
-    def _swept(self, arcs: Arcs, pieces: Pieces, points: np.ndarray) -> np.ndarray:
-        """Return the distances of the hulls of where points of the vehicle are at both ends of pieces."""
+    def _swept(self, arcs: Arcs, pieces: Pieces, points: np.ndarray, reach: float) -> np.ndarray:
+        """Return the distances of the hulls of where points of the vehicle are at both ends of pieces, at most `reach`."""
         ends = [self._placed(*arcs.at(pieces.index, s), points) for s in (pieces.begin, pieces.begin + pieces.size)]
-        return np.asarray(self._obstacles.shape_distance(np.concatenate(ends, axis=1), hull=True))
+        return np.asarray(self._obstacles.shape_distance(np.concatenate(ends, axis=1), hull=True, reach=reach))
 
     @staticmethod
     def _placed(x: np.ndarray, y: np.ndarray, theta: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -298,9 +308,9 @@ class _LeastFound:
         self.clearance, self.place = math.inf, (math.nan, math.nan)
 
     def measure(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the clearances at arc lengths `s` of the arcs `index`, and remember the least."""
+        """Return the clearances at arc lengths `s` of the arcs `index`, and remember the least; those above it may be cut."""
         x, y, theta = self._arcs.at(index, s)
-        found = self._vehicle.clearance(x, y, theta)
+        found = self._vehicle.clearance(x, y, theta, self.clearance)
         nearest = int(np.argmin(found))
         if found[nearest] < self.clearance:
             self.clearance, self.place = float(found[nearest]), (float(x[nearest]), float(y[nearest]))
@@ -310,24 +320,24 @@ class _LeastFound:
 def refine(arcs: Arcs, vehicle: DiscSweep | PolygonSweep, required_clearance: float, check_time: Callable[[], None]) -> _Least:
     """Divide the pieces until none can hide contact; return the least clearance, where it is, and whether that was achieved."""
     least = _LeastFound(arcs, vehicle)
-    waiting, judged = _first_pieces(arcs, least, check_time), 0
+    waiting, judged = _first_pieces(arcs, least, vehicle.at_once, check_time), 0
     while waiting and judged <= MOST_PIECES and least.clearance >= required_clearance - CONTACT:
         check_time()
         pieces = waiting.pop()
         judged += len(pieces)
         enough = max(required_clearance - 2 * CONTACT, least.clearance - max(PRECISION, SHARE * least.clearance))
         undecided = pieces[vehicle.bound(arcs, pieces, enough) < enough]
-        for first in range(0, len(undecided), AT_ONCE // PARTS):
-            some = undecided[first:first + AT_ONCE // PARTS]
+        for first in range(0, len(undecided), vehicle.at_once // PARTS):
+            some = undecided[first:first + vehicle.at_once // PARTS]
             waiting.append(some.divided(least, vehicle.parts(some, enough)))
     return least.clearance, least.place, judged <= MOST_PIECES
 
 
-def _first_pieces(arcs: Arcs, least: _LeastFound, check_time: Callable[[], None]) -> list[Pieces]:
+def _first_pieces(arcs: Arcs, least: _LeastFound, at_once: int, check_time: Callable[[], None]) -> list[Pieces]:
     """Return the pieces that a path is cut into at first, in portions."""
     index, begin, size = arcs.pieces(max(float(arcs.length.sum()) / FIRST_PIECES, PRECISION))
-    return [_with_ends(index[first:first + AT_ONCE], begin[first:first + AT_ONCE], size[first:first + AT_ONCE], least, check_time)
-            for first in range(0, len(index), AT_ONCE)]
+    portions = (slice(first, first + at_once) for first in range(0, len(index), at_once))
+    return [_with_ends(index[some], begin[some], size[some], least, check_time) for some in portions]
 
 
 def _with_ends(index: np.ndarray, begin: np.ndarray, size: np.ndarray, least: _LeastFound, check_time: Callable[[], None]

@@ -9,6 +9,7 @@ import shapely
 
 from ..collision.clearance import ClearanceField
 from ..collision.raster import CLEARANCE_MARGIN
+from ..deadline import OutOfTime, unlimited
 from ..maps.model import OCCUPIED, UNKNOWN, GridMap
 from ..problem import Pose, Problem
 from ..result import Status
@@ -55,8 +56,11 @@ class Diagnosis:
     location: Point | None = None
 
 
-def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
-    """Return why there provably is no path, if that can be known without a search."""
+def before_search(problem: Problem, field: ClearanceField, check_time: Callable[[], None] = unlimited) -> Diagnosis | None:
+    """Return why there provably is no path, if that can be known without a search.
+
+    `check_time` is called every few milliseconds; where it raises OutOfTime, the sentence has no figures.
+    """
     required = problem.vehicle.required_clearance + CLEARANCE_MARGIN
     for name, pose, tolerance, outside, occupied in (
             ("Start", problem.start, 0.0, Status.START_OUTSIDE_MAP, Status.START_OCCUPIED),
@@ -71,8 +75,7 @@ def before_search(problem: Problem, field: ClearanceField) -> Diagnosis | None:
         if problem.vehicle.footprint and is_one_pose and not field.pose_is_free(pose, problem.vehicle):
             return _diagnosis(occupied, *_overlapping(problem, field, name, pose), problem, field)
     if are_separated(problem, field):
-        between, location = _unknown_between(problem, field) or _narrow_between(problem, field, widest_passage(problem, field))
-        return Diagnosis(Status.NO_VALID_PATH, f"No path exists: {between}.", location)
+        return Diagnosis(Status.NO_VALID_PATH, *_separated(problem, field, check_time))
     return None
 
 
@@ -82,6 +85,17 @@ def _diagnosis(status: Status, message: str, location: Point, problem: Problem, 
         away = rounded_up(math.dist(free[:2], problem.goal[:2]))
         message = f"{message[:-1]}; ({free[0]:.3f}, {free[1]:.3f}, {free[2]:.3f}) is free, {away} m away."
     return Diagnosis(status, message, location)
+
+
+def _separated(problem: Problem, field: ClearanceField, check_time: Callable[[], None]) -> tuple[str, Point | None]:
+    """Return the sentence on what separates start and goal, and where that is."""
+    try:
+        between, location = (_unknown_between(problem, field, check_time)
+                             or _narrow_between(problem, field, widest_passage(problem, field, check_time), check_time))
+    except OutOfTime:
+        between, location = (f"walls or narrow places separate start and goal for {_size(problem.vehicle)}; "
+                             "allow more time to be told where"), None
+    return f"No path exists: {between}.", location
 
 
 def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str, check_time: Callable[[], None]
@@ -100,19 +114,19 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str,
                 f"set goal_tolerance_xy and goal_tolerance_yaw if it is close enough, or allow more {more}"), None
     if problem.vehicle.required_clearance < 0:
         return f"{NO_DISC}, so that nothing is proved; {_nearest_to_goal(problem, tree, more)}", None
-    stuck = _all_arcs_hit(problem, field, problem.start)
+    stuck = _all_arcs_hit(problem, field, problem.start, check_time)
     if stuck and _distances(tree, problem.start).max() <= 2 * stuck[0]:
         return (f"every forward arc from the start hits an obstacle within {rounded_up(stuck[0])} m, the longest at "
                 f"{at(stuck[1])}; move or turn the start, or check turning_radius ({radius:g} m)"), stuck[1]
     x, y, theta = problem.goal
-    stuck = _all_arcs_hit(problem, field, (x, y, theta + math.pi)) if problem.exact_goal else None
+    stuck = _all_arcs_hit(problem, field, (x, y, theta + math.pi), check_time) if problem.exact_goal else None
     if stuck:
         return ("no forward arc reaches the goal: every one that ends there comes through an obstacle within the last "
                 f"{rounded_up(stuck[0])} m, the longest at {at(stuck[1])}; move or turn the goal, or check turning_radius "
                 f"({radius:g} m)"), stuck[1]
-    passage = widest_passage(problem, field)
+    passage = widest_passage(problem, field, check_time)
     if passage is None or passage.radius < problem.vehicle.inscribed_radius:
-        return _unknown_between(problem, field) or _narrow_between(problem, field, passage)
+        return _unknown_between(problem, field, check_time) or _narrow_between(problem, field, passage, check_time)
     if len(tree) == 1:
         return f"no curve of the turning radius {radius:g} m left the start; set step_size, or allow more {more}", None
     return _nearest_to_goal(problem, tree, more), None
@@ -225,9 +239,9 @@ def _size(vehicle: Vehicle) -> str:
     return f"robot_radius {vehicle.robot_radius:g} m"
 
 
-def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Point] | None:
+def _unknown_between(problem: Problem, field: ClearanceField, check_time: Callable[[], None]) -> tuple[str, Point] | None:
     """Return a clause that says that start and goal are separated by unknown space, if they are, and where it begins."""
-    passage = widest_passage_through_unknown(problem)
+    passage = widest_passage_through_unknown(problem, check_time)
     if passage is None:
         return None
     clearance = field.at(passage.points)
@@ -238,7 +252,8 @@ def _unknown_between(problem: Problem, field: ClearanceField) -> tuple[str, Poin
             f"it begins at {at(begins.nearest)}{value}; {_remedy_for_unknown(begins)}"), begins.nearest
 
 
-def _narrow_between(problem: Problem, field: ClearanceField, passage: Passage | None) -> tuple[str, Point | None]:
+def _narrow_between(problem: Problem, field: ClearanceField, passage: Passage | None, check_time: Callable[[], None]
+                    ) -> tuple[str, Point | None]:
     """Return a clause that says that start and goal are separated by walls, or joined by too narrow a place, and where that is.
 
     Args:
@@ -251,8 +266,8 @@ def _narrow_between(problem: Problem, field: ClearanceField, passage: Passage | 
                 else f"with radius {radius} m instead of {vehicle.robot_radius:g} m they are connected")
         return (f"the widest way found between start and goal is {metres(passage.width)} m wide at {at(passage.narrowest)}; "
                 f"{lack}; check the map there, {smaller}"), passage.narrowest
-    if are_walled_off(problem, field):
-        walls = "walls or unknown space separate" if avoids_unknown(problem) else "walls separate"
+    if are_walled_off(problem, field, check_time):
+        walls = "walls or unknown space separate" if avoids_unknown(problem, check_time) else "walls separate"
         return f"{walls} start and goal, so that no {_parameter(vehicle)} is small enough; check the map", None
     width = rounded_up(4 * sample_spacing(problem.map, field))
     lack = f"{_size(vehicle)} does not fit" if vehicle.footprint else f"robot_radius is {vehicle.robot_radius:g} m"
@@ -264,7 +279,8 @@ def _distances(tree: Tree, pose: Pose) -> np.ndarray:
     return np.hypot(tree.poses[:, 0] - pose[0], tree.poses[:, 1] - pose[1])
 
 
-def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[float, Point] | None:
+def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose, check_time: Callable[[], None]
+                  ) -> tuple[float, Point] | None:
     """Return the length of the longest arc from a pose [m] and where it hits, if all hit within a quarter of the tightest turn.
 
     So it is with a vehicle that faces a wall closer than its turning radius. Each step along an arc is as long as the clearance.
@@ -273,6 +289,7 @@ def _all_arcs_hit(problem: Problem, field: ClearanceField, pose: Pose) -> tuple[
     curvature = CURVATURES / problem.vehicle.turning_radius
     driven = np.zeros(len(curvature))
     for _ in range(MAX_STEPS):
+        check_time()
         half = curvature * driven / 2
         chord = driven * np.sinc(half / math.pi)
         points = pose[:2] + chord[:, None] * np.column_stack([np.cos(pose[2] + half), np.sin(pose[2] + half)])

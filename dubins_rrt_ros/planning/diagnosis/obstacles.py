@@ -1,12 +1,14 @@
 """Obstacles around a point: the nearest one, and whether they leave room enough."""
 
 import math
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from ..collision.clearance import ClearanceField
+from ..deadline import unlimited
 from ..maps.model import GridMap, Map
 from ..problem import Problem
 from ..vehicle import Point
@@ -15,6 +17,8 @@ from ..vehicle import Point
 ROUNDING = 1e-9
 #: Coordinates are clamped to this, so that their squares stay finite [m].
 LARGEST_COORDINATE = 1e100
+#: Approximate number of cells of a grid that are worked on before the time is looked at.
+STRIP = 250_000
 #: The kinds of obstacles.
 OBSTACLE, UNKNOWN_SPACE, MAP_EDGE = "obstacle", "unknown space", "the map's edge"
 #: Points of the unit disc, those of a square grid that lie beyond it moved to its rim ...
@@ -62,10 +66,24 @@ def has_no_room(field: ClearanceField, required_clearance: float, point: Point, 
     return bool(field.at(places).max() + tolerance * DISC_GAP < required_clearance)
 
 
-def avoids_unknown(problem: Problem) -> bool:
+def strips(grid: GridMap, factor: int = 1) -> Iterator[slice]:
+    """Yield slices of a grid's rows that take a few milliseconds each; all but the last have a multiple of `factor` rows."""
+    rows, columns = grid.data.shape
+    height = factor * max(1, STRIP // (factor * columns))
+    for first in range(0, rows, height):
+        yield slice(first, min(first + height, rows))
+
+
+def avoids_unknown(problem: Problem, check_time: Callable[[], None] = unlimited) -> bool:
     """Return True if the map has unknown space that is taken as an obstacle."""
-    return (isinstance(problem.map, GridMap) and not problem.allow_unknown
-            and bool((problem.map.blocked(False) != problem.map.blocked(True)).any()))
+    if not isinstance(problem.map, GridMap) or problem.allow_unknown:
+        return False
+    for strip in strips(problem.map):
+        check_time()
+        cells, blocked = problem.map.data[strip], problem.map.thresholds.blocked
+        if (blocked(cells, False) != blocked(cells, True)).any():
+            return True
+    return False
 
 
 def nearest_obstacle(world_map: Map, allow_unknown: bool, point: Point, clearance: float) -> Obstacle:

@@ -1,6 +1,7 @@
 """The widest passage between start and goal: how large a disc that turns on the spot gets through, and where it is narrowest."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,17 +10,20 @@ from .._kernels import COMPILED
 from .._kernels.widest_path import WidestPathSearch
 from ..collision.clearance import ClearanceField
 from ..collision.raster import CLEARANCE_MARGIN
+from ..deadline import unlimited
 from ..maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map
 from ..problem import Problem
 from ..vehicle import Point
-from .obstacles import ROUNDING, avoids_unknown, rectangle
+from .obstacles import ROUNDING, avoids_unknown, rectangle, strips
 
 #: Maximum number of nodes, about, of the grid of samples that passages are sought on ...
 MAX_NODES = 1_000_000 if COMPILED else 50_000
 #: ... and maximum number of cells, about, of the map that they are sought on through unknown space.
 MAX_CELLS = 500_000
-#: Minimum number of points along a passage whose clearance is measured.
-MEASURED = 20_000 if COMPILED else 2_000
+#: Minimum number of points along a passage whose clearance is measured, and number of them that are measured at once.
+MEASURED, AT_ONCE = (20_000, 2_000) if COMPILED else (2_000, 50)
+#: Number of nodes that are visited before the time is looked at.
+SLICE = 5_000 if COMPILED else 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +43,11 @@ class Passage:
     narrowest: Point
 
 
-def widest_passage(problem: Problem, field: ClearanceField) -> Passage | None:
+def widest_passage(problem: Problem, field: ClearanceField, check_time: Callable[[], None] = unlimited) -> Passage | None:
     """Find the widest passage from start to goal on a grid of samples, or one that is wide enough; None where there is none.
 
-    Then no passage between start and goal is wider than four of `sample_spacing`.
+    Then no passage between start and goal is wider than four of `sample_spacing`. `check_time` is called every few milliseconds;
+    what it raises ends the search.
     """
     grid = _SampleGrid(problem.map, field)
     starts = grid.nodes_at(problem.start[:2], 0.0)
@@ -54,22 +59,26 @@ def widest_passage(problem: Problem, field: ClearanceField) -> Passage | None:
     search = WidestPathSearch(clearance=field.kernel, first=grid.first, along=grid.step_along, shape=(grid.rows, grid.columns),
                               is_target=is_target, least=grid.spacing / 2,
                               enough=problem.vehicle.inscribed_radius + CLEARANCE_MARGIN + grid.spacing)
-    _, nodes = search.widest_path(int(starts[np.argmax(field.at(grid.points(starts)))]))
+    search.begin(int(starts[np.argmax(field.at(grid.points(starts)))]))
+    while search.run(SLICE):
+        check_time()
+    _, nodes = search.widest_path()
     if len(nodes) == 0:
         return None
     points = grid.points(nodes)
     to_goal = problem.goal[:2] - points[-1]
     left = math.hypot(*to_goal)
     end = points[-1] + to_goal * (max(0.0, left - problem.goal_tolerance_xy) / left if left > 0 else 0.0)
-    return _measured(np.vstack([problem.start[:2], points, end]), field)
+    return _measured(np.vstack([problem.start[:2], points, end]), field, check_time)
 
 
-def widest_passage_through_unknown(problem: Problem) -> Passage | None:
+def widest_passage_through_unknown(problem: Problem, check_time: Callable[[], None] = unlimited) -> Passage | None:
     """Find a passage that is wide enough for the vehicle where unknown space is taken as free; None where none is found."""
-    if not (isinstance(problem.map, GridMap) and avoids_unknown(problem)):
+    if not (isinstance(problem.map, GridMap) and avoids_unknown(problem, check_time)):
         return None
-    grid = _coarsened(problem.map, math.ceil(math.sqrt(problem.map.data.size / MAX_CELLS)))
-    passage = widest_passage(replace(problem, map=grid, allow_unknown=True), ClearanceField(grid, allow_unknown=True))
+    grid = _coarsened(problem.map, math.ceil(math.sqrt(problem.map.data.size / MAX_CELLS)), check_time)
+    opened = replace(problem, map=grid, allow_unknown=True)
+    passage = widest_passage(opened, ClearanceField(grid, allow_unknown=True), check_time)
     return passage if passage and passage.radius >= problem.vehicle.inscribed_radius else None
 
 
@@ -115,12 +124,15 @@ class _SampleGrid:
         return found
 
 
-def _measured(corners: np.ndarray, field: ClearanceField) -> Passage:
+def _measured(corners: np.ndarray, field: ClearanceField, check_time: Callable[[], None]) -> Passage:
     """Return a passage along straight lines; between points s apart with clearances c, c' there is at least (c + c' - s) / 2."""
     at_corners = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     arc_lengths = np.union1d(at_corners, np.linspace(0, at_corners[-1], MEASURED))
     points = np.column_stack([np.interp(arc_lengths, at_corners, corners[:, axis]) for axis in (0, 1)])
-    clearance = field.at(points)
+    clearance = np.empty(len(points))
+    for first in range(0, len(points), AT_ONCE):
+        check_time()
+        clearance[first:first + AT_ONCE] = field.at(points[first:first + AT_ONCE])
     radius = float(((clearance[1:] + clearance[:-1] - np.diff(arc_lengths)) / 2).min())
     return Passage(points, radius, *_narrowest(corners, field.at(corners)))
 
@@ -134,15 +146,21 @@ def _narrowest(corners: np.ndarray, clearance: np.ndarray) -> tuple[float, Point
     return 2 * float(clearance.min()), (x, y)
 
 
-def _coarsened(grid: GridMap, factor: int) -> GridMap:
+def _coarsened(grid: GridMap, factor: int, check_time: Callable[[], None]) -> GridMap:
     """Return the grid with blocks of `factor` x `factor` cells as cells, each as bad as the worst of them."""
     if factor == 1:
         return grid
-    occupied, blocked = (_any_of_blocks(cells, factor) for cells in (grid.blocked(True), grid.blocked(False)))
-    for axis, n in enumerate(grid.data.shape):
-        if n % factor:  # the last block reaches beyond the map
-            np.moveaxis(occupied, axis, 0)[-1] = True
-    data = np.where(occupied, OCCUPIED, np.where(blocked, UNKNOWN, FREE)).astype(np.int8)
+    rows, columns = (-(-cells // factor) for cells in grid.data.shape)
+    data = np.full((rows, columns), FREE, np.int8)
+    for strip in strips(grid, factor):
+        check_time()
+        cells = grid.data[strip]
+        occupied, blocked = (_any_of_blocks(grid.thresholds.blocked(cells, unknown), factor) for unknown in (True, False))
+        data[strip.start // factor:strip.start // factor + len(occupied)] = np.where(
+            occupied, OCCUPIED, np.where(blocked, UNKNOWN, FREE))
+    for axis, cells in enumerate(grid.data.shape):
+        if cells % factor:  # the last block reaches beyond the map
+            np.moveaxis(data, axis, 0)[-1] = OCCUPIED
     return GridMap(data, grid.resolution * factor, grid.origin, grid.name)
 
 

@@ -17,7 +17,7 @@ from .pace import Pace
 #: Number of changes that are tried in one round.
 TRIES = 512
 #: Number of changes in the first slice of a round, after which the time is looked at.
-FIRST_SLICE = 16
+FIRST_SLICE = 4
 #: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
 FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
 #: Price of a curve of a path that is published, in turning radii, and number of rounds that simplify it.
@@ -42,7 +42,11 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
     shortcutter = Shortcutter(checker=field.collision_checker(vehicle), edge_cost=edge_cost, radius=path.radius,
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
                               tries=TRIES, price=price)
-    pace, tried = Pace(FIRST_SLICE, TRIES), 0
+    pace, tried, is_left = Pace(FIRST_SLICE, TRIES), 0, True
+    while is_left and not interrupted():
+        checks = pace.size
+        with pace.measured(checks):
+            is_left = shortcutter.prepare(checks)
     while tried < TRIES and not interrupted():
         begin, tried = tried, min(tried + pace.size, TRIES)
         with pace.measured(tried - begin):
