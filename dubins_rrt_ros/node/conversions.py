@@ -193,6 +193,33 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds
                    thresholds=thresholds)
 
 
+def updated_grid(grid: GridMap, message: Any, frame: str) -> GridMap:
+    """Return a map with the cells of a map_msgs/OccupancyGridUpdate in place of its own.
+
+    Args:
+        grid: the map; it stays as it is.
+        message: the window that changed.
+        frame: the global frame.
+
+    Raises:
+        MapError: the update is in another frame, reaches beyond the map, or its fields contradict each other.
+    """
+    height, width = grid.data.shape
+    if message.header.frame_id not in ("", frame):
+        raise MapError(f"the map update is in frame {quoted_name(message.header.frame_id)}, not in '{frame}'; publish it in "
+                       f"'{frame}' or set global_frame")
+    if len(message.data) != message.width * message.height:
+        raise MapError(f"the map update has {len(message.data)} values for {message.width} x {message.height} cells; give width "
+                       "times height values")
+    if not (0 <= message.x <= width - message.width and 0 <= message.y <= height - message.height):
+        raise MapError(f"the map update, {message.width} x {message.height} cells at ({message.x}, {message.y}), reaches beyond "
+                       f"the map of {width} x {height}; give a part of the map")
+    cells = grid.data.copy()
+    window = np.frombuffer(message.data, dtype=np.int8).reshape(message.height, message.width)
+    cells[message.y:message.y + message.height, message.x:message.x + message.width] = window
+    return GridMap(cells, grid.resolution, grid.origin, grid.name, percent=True, thresholds=grid.thresholds)
+
+
 def is_same_grid(one: GridMap, other: GridMap) -> bool:
     """Return True if two grids have the same cells at the same places, which are taken alike."""
     return ((one.resolution, one.origin, one.thresholds) == (other.resolution, other.origin, other.thresholds)

@@ -5,7 +5,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from rclpy.node import Node
 
 from dubins_rrt_ros.planning import InvalidPose, Status
-from dubins_rrt_ros.planning.problem import Pose
+from dubins_rrt_ros.planning.problem import Pose, Waypoint
 from dubins_rrt_ros.planning.text import quoted_name
 
 from .conversions import bare_pose, doubts_about, has_rotation, nanoseconds, pose_from, transformed
@@ -62,6 +62,11 @@ class Frames:
             raise Refusal(Status.INVALID_POSE, str(error)) from None
         self._warn_once(name, pose)
         return planar
+
+    def waypoint(self, name: str, message: PoseStamped) -> Waypoint:
+        """Return the same of a pose on the way, whose yaw is None where its quaternion is all zero: any heading will do."""
+        x, y, yaw = self.pose(name, message, any_heading=True)
+        return x, y, yaw if has_rotation(message.pose) else None
 
     def vehicle(self) -> Pose:
         """Return the (x, y, yaw) of the vehicle's frame at the latest time; any thread may ask for it.

@@ -1,19 +1,20 @@
-"""The goal that came by topic, which stands until it is reached, cancelled or replaced."""
+"""The goal that came by topic, alone or after waypoints, which stands until it is reached, cancelled or replaced."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from functools import partial
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.node import Node
 from rclpy.timer import Timer
 
 from dubins_rrt_ros.planning import Audit, Plan, Pose, Status
 from dubins_rrt_ros.planning.curves.angles import heading_error, position_error
 from dubins_rrt_ros.planning.curves.progress import PathProgress
+from dubins_rrt_ros.planning.result import waypoint_arc_lengths
 
-from .conversions import are_equal
+from .conversions import are_equal, has_rotation
 from .dispatcher import Dispatcher
 from .executor_queue import steady_timer
 from .frames import Frames
@@ -27,6 +28,10 @@ from .worker import Job
 
 #: Time between two attempts where what is waited for comes by transforms [s]: nothing tells that one has come.
 TRANSFORM_INTERVAL = 0.5
+
+
+#: Waypoints in their order, the last of which is the goal.
+Goal = tuple[PoseStamped, ...]
 
 
 class _Purpose(Enum):
@@ -65,14 +70,16 @@ class GoalSession:
                  outputs: Outputs, path_check: PathCheck):
         self._node, self._parameters, self._dispatcher, self._readiness = node, parameters, dispatcher, readiness
         self._frames, self._outputs, self._path_check = frames, outputs, path_check
-        self._goal: PoseStamped | None = None  # None again once it is cancelled
+        self._goal: Goal | None = None  # None again once it is cancelled
+        self._passed = 0  # number of its waypoints that the vehicle has passed
         self._request: _Request | None = None  # that is under way
         self._plan_id = self._revision = 0  # of the newest answer
-        self._waiting: tuple[PoseStamped, int] | None = None  # a newer goal, and its plan_id
+        self._waiting: tuple[Goal, int] | None = None  # a newer goal, and its plan_id
         self._patience = self._timer(self._begin_waiting)  # runs meanwhile
         self._failure: Outcome | None = None  # of the last request, where something can cure it
         self._retry_timer = self._timer(self._on_retry_timer)  # runs while a transform can
         self._progress: PathProgress | None = None  # along the path on display
+        self._to_pass: list[float] = []  # arc lengths of its waypoints on that path [m]
         self._is_reached = False
         self._map_changed = False  # while it was planned again
         self._replan_timer = self._timer(self._replan)  # runs while the goal is pursued, where it is planned again at a rate
@@ -91,6 +98,17 @@ class GoalSession:
 
     def take(self, goal: PoseStamped) -> None:
         """Plan to this goal, which replaces the one before, once that has a first path or none."""
+        self._take((goal,))
+
+    def take_poses(self, goals: PoseArray) -> None:
+        """Plan over these poses to the last of them, likewise."""
+        if goals.poses:
+            self._take(tuple(PoseStamped(header=goals.header, pose=pose) for pose in goals.poses))
+        else:
+            message = "There are no poses in goal_poses; give at least the goal."
+            self._report(Outcome(Status.INVALID_POSE, message), plan_id=self._dispatcher.new_id(), revision=1)
+
+    def _take(self, goal: Goal) -> None:
         awaited = self._awaited_request
         if awaited is not None and self._goal is not None and self._are_equal(goal, self._goal):
             self._drop_waiting()
@@ -139,10 +157,13 @@ class GoalSession:
         """The request under way, if all of it is told: whoever sends a goal has an answer, and others may end without one."""
         return self._request if self._request is not None and self._request.purpose is _Purpose.GOAL else None
 
-    def _are_equal(self, goal: PoseStamped, other: PoseStamped) -> bool:
-        """Return True if two goals are the same place; in a frame that may move they are only at the same time."""
-        moves = not self._frames.is_global(goal.header.frame_id)
-        return are_equal(goal, other) and not (moves and goal.header.stamp != other.header.stamp)
+    def _are_equal(self, goal: Goal, other: Goal) -> bool:
+        """Return True if two goals are the same places; in a frame that may move they are only at the same time."""
+        def moved(one: PoseStamped, two: PoseStamped) -> bool:
+            return not self._frames.is_global(one.header.frame_id) and one.header.stamp != two.header.stamp
+
+        return len(goal) == len(other) and all(
+            are_equal(one, two) and not moved(one, two) for one, two in zip(goal, other, strict=True))
 
     def _begin_waiting(self) -> None:
         """Plan to the goal that waits, if there is one."""
@@ -153,15 +174,18 @@ class GoalSession:
         self._waiting = None
         self._patience.cancel()
 
-    def _begin(self, goal: PoseStamped, plan_id: int) -> None:
+    def _begin(self, goal: Goal, plan_id: int) -> None:
         """Make this the goal that counts."""
-        self._goal, self._is_reached = goal, False
+        self._goal, self._passed, self._is_reached = goal, 0, False
         self._forget_failure()
         self._drop_waiting()
         self._plan(_Purpose.GOAL, plan_id)
 
     def _plan(self, purpose: _Purpose, plan_id: int = 0) -> None:
         """Plan to the goal, with a new plan_id if one is given; nothing of a request under way is told any more."""
+        goal = self._goal
+        if goal is None:
+            return
         if self._request is not None and self._request.job is not None:
             self._request.job.cancel()
         self._request = None
@@ -169,17 +193,19 @@ class GoalSession:
             self._plan_id, self._revision = plan_id, 0
         request = _Request(purpose)
         with failures_reported(self._node, partial(self._conclude, request)):
-            locate = partial(self._locate, self._goal, self._dispatcher.any_goal_heading)
-            planned = self._dispatcher.request(self._readiness.require_map(), locate)
+            any_heading = self._dispatcher.any_goal_heading or (len(goal) > 1 and not has_rotation(goal[-1].pose))
+            locate = partial(self._locate, goal[self._passed:], any_heading)
+            planned = self._dispatcher.request(self._readiness.require_map(), locate, any_goal_heading=any_heading)
             if purpose is _Purpose.GOAL and not planned.world.done():
                 self._node.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
             improve = None if self._parameters.read().node.publish == "final" else partial(self._improve, request)
             request.job = self._dispatcher.submit(self._dispatcher.goals, planned, partial(self._end, request), improve).job
             self._request = request
 
-    def _locate(self, goal: PoseStamped, any_heading: bool) -> Route:
+    def _locate(self, goal: Goal, any_heading: bool) -> Route:
         # In a worker's thread.
-        return Route(self._readiness.require_start(), self._frames.pose("goal", goal, any_heading))
+        start, end = self._readiness.require_start(), self._frames.pose("goal", goal[-1], any_heading)
+        return Route(start, end, tuple(self._frames.waypoint(f"waypoint {n}", pose) for n, pose in enumerate(goal[:-1], 1)))
 
     def _improve(self, request: _Request, plan: Plan) -> None:
         if request is self._request and self._is_wanted(request, plan):
@@ -221,6 +247,7 @@ class GoalSession:
         self._outputs.answer(outcome, last=last, plan_id=self._plan_id, revision=self._revision, map_id=self._readiness.map_id)
         path = outcome.plan and outcome.plan.path
         self._progress = PathProgress(path) if path else None
+        self._to_pass = [] if outcome.plan is None else waypoint_arc_lengths(outcome.plan)
         self._follow()
 
     def _warn(self, status: Status, message: str) -> None:
@@ -271,9 +298,12 @@ class GoalSession:
         if self._progress is None or self._outputs.shown is None:
             return
         self._progress.advance(start)
-        limits, goal = self._parameters.read().node, self._outputs.shown.problem.goal
-        self._is_reached |= (position_error(start, goal) <= limits.goal_reached_xy
-                             and heading_error(start, goal) <= limits.goal_reached_yaw)
+        while self._to_pass and self._to_pass[0] <= self._progress.arc_length:
+            self._passed += 1
+            del self._to_pass[0]
+        limits, problem = self._parameters.read().node, self._outputs.shown.problem
+        self._is_reached |= (not self._to_pass and position_error(start, problem.goal) <= limits.goal_reached_xy
+                             and heading_error(start, problem.goal) <= max(limits.goal_reached_yaw, problem.yaw_tolerance))
 
     def _is_wanted(self, request: _Request, plan: Plan | None) -> bool:
         """Return True if the answer to a request is to be told.

@@ -16,12 +16,17 @@ from dubins_rrt_ros.planning.collision.footprint import summary
 from dubins_rrt_ros.planning.maps.locate import find_map
 from dubins_rrt_ros.planning.text import one_line
 
-from .conversions import as_grid, grid_from, grid_message, is_same_grid
+from .conversions import as_grid, grid_from, grid_message, is_same_grid, updated_grid
 from .executor_queue import ExecutorQueue
 from .outcome import Outcome
 from .parameters import NodeOptions, Parameters
-from .qos import LATCHED, VOLATILE
+from .qos import LATCHED, UPDATES, VOLATILE
 from .worker import Worker
+
+try:
+    from map_msgs.msg import OccupancyGridUpdate
+except ImportError:  # part of an installation of ROS, not of the packages for pip
+    OccupancyGridUpdate = None
 
 #: Time between two checks for a signal while the first map is loaded [s].
 LOADING_INTERVAL = 0.25
@@ -73,6 +78,8 @@ class Maps:
         else:
             qos = LATCHED if self._options.map_transient_local else VOLATILE
             node.create_subscription(OccupancyGrid, "map", self._on_map, qos)
+            if OccupancyGridUpdate is not None:
+                node.create_subscription(OccupancyGridUpdate, "map_updates", self._on_update, UPDATES)
         node.add_post_set_parameters_callback(self._on_parameters)
 
     @property
@@ -197,6 +204,17 @@ class Maps:
                 self._keep()
             else:
                 self.take(grid, grid, by_topic=True)
+
+    def _on_update(self, message: Any) -> None:
+        """Take the map that came by topic with a part of it changed; before there is one, a part says nothing."""
+        if not self._came_by_topic or self.grid is None:
+            return
+        try:
+            grid = updated_grid(self.grid, message, self._frame)
+        except MapError as error:
+            self.refuse(error, log_again=False)
+        else:
+            self.take(grid, grid, by_topic=True)
 
     def _keep(self) -> None:
         """Stay with the map, which came again: a publisher may repeat it each second."""

@@ -2,7 +2,7 @@
 
 from typing import Any, TypeVar
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
@@ -84,6 +84,7 @@ class PlannerNode(ManagedNode):
     def _listen(self) -> None:
         self._start_topics = StartTopics(self, self._readiness, self._frames, self._session.start_came)
         self.create_subscription(PoseStamped, "goal_pose", self._session.take, VOLATILE)
+        self.create_subscription(PoseArray, "goal_poses", self._session.take_poses, VOLATILE)
         # In the default group a service that awaits would keep everything else waiting.
         group = ReentrantCallbackGroup()
         self._plan_service = PlanService(self, self._dispatcher, self._readiness, self._frames, self._outputs, group)

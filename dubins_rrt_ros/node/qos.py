@@ -11,6 +11,8 @@ from dubins_rrt_ros.planning.text import one_line
 VOLATILE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 #: Quality of service of messages whose last one late subscribers get too.
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: Quality of service of changes of a map, each of which counts.
+UPDATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 #: Services: a call beyond the depth would be lost without a word, and ten at once, the depth of ROS' own profile, are soon there.
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 

@@ -230,6 +230,16 @@ class Plan(Plottable):
         return any(self.tree.path_to(node) == path for node in ends.nonzero()[0])
 
 
+def waypoint_arc_lengths(plan: Plan) -> list[float]:
+    """Return how far along its path a plan passes each of its waypoints [m], to within a pose's spacing."""
+    if plan.path is None or not plan.waypoint_indices:
+        return []
+    chords = np.hypot(*np.diff(plan.poses()[:, :2], axis=0).T)
+    driven = np.append(0.0, np.cumsum(chords))
+    scale = plan.path.length / driven[-1] if driven[-1] else 1.0
+    return [float(driven[index]) * scale for index in plan.waypoint_indices]
+
+
 def pose_spacing(problem: Problem, settings: Settings) -> float:
     """Return the maximum distance between two poses of a path [m]: that of the settings, or a fine one where that is 0."""
     world_map, vehicle = problem.map, problem.vehicle

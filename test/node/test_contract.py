@@ -26,6 +26,7 @@ TOPICS = [
     ("in", "start_pose", "geometry_msgs/msg/PoseStamped", VOLATILE),
     ("in", "initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", VOLATILE),
     ("in", "goal_pose", "geometry_msgs/msg/PoseStamped", VOLATILE),
+    ("in", "goal_poses", "geometry_msgs/msg/PoseArray", VOLATILE),
     ("in", "map", "nav_msgs/msg/OccupancyGrid", LATCHED),
     ("out", "plan", "nav_msgs/msg/Path", LATCHED),
     ("out", "map", "nav_msgs/msg/OccupancyGrid", LATCHED),
@@ -136,7 +137,7 @@ def test_every_name_is_relative_and_can_be_remapped(module_planners, with_file):
     """Also the node's own names, which stand below its name."""
     _, client = with_file
     outputs = ["plan", "map", "~/tree", "~/status"]
-    inputs = ["start_pose", "initialpose", "goal_pose"]
+    inputs = ["start_pose", "initialpose", "goal_pose", "goal_poses"]
     services = [f"~/{name.removeprefix('planner/')}" for name, _ in SERVICES]
     names = [*outputs, *inputs, *services, "/diagnostics"]
     others = {name: f"elsewhere/{name.strip('~/')}" for name in names}
