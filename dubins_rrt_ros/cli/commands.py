@@ -35,6 +35,7 @@ COMMANDS = {
     "paper": Command("measure again what the paper measured", "dubins_rrt_ros.evaluation.paper.command"),
     "play": Command("drag start and goal in the browser, and see the path follow", "dubins_rrt_ros.cli.play.command"),
     "render": Command("make a map_server pair of a polygon map", "dubins_rrt_ros.cli.render"),
+    "watch": Command("see a running node in the browser: map, path, tree and status", "dubins_rrt_ros.cli.watch.command"),
     "completion": Command("let the tab key complete commands, flags and map names", "dubins_rrt_ros.cli.completion"),
 }
 

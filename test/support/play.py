@@ -8,6 +8,7 @@ import threading
 import aiohttp
 
 from dubins_rrt_ros.cli.play.server import PlayServer
+from dubins_rrt_ros.cli.play.session import Session
 from dubins_rrt_ros.cli.play.workbench import Workbench
 from dubins_rrt_ros.planning import load_map
 
@@ -21,8 +22,15 @@ def workbench(folder, name="maze"):
 
 @contextlib.contextmanager
 def serving(bench, port=0, token=""):
-    """Serve in a thread while the context lasts; the context is the server."""
-    loop, server = asyncio.new_event_loop(), PlayServer(bench, token)
+    """Serve a workbench in a thread while the context lasts; the context is the server."""
+    with serving_sessions(lambda send: Session(bench, send), port, token) as server:
+        yield server
+
+
+@contextlib.contextmanager
+def serving_sessions(make_session, port=0, token=""):
+    """Serve pages in a thread while the context lasts; the context is the server."""
+    loop, server = asyncio.new_event_loop(), PlayServer(make_session, token)
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     try:

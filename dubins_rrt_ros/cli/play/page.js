@@ -11,6 +11,7 @@ const STORE = "dubins_rrt play";
 
 let socket = null, options = null, changed = {}, tool = "move", held = null, restTimer = 0;
 let number = 0, dirty = null, sent = new Map(), times = [], lastFiles = [], firstOf = 0;
+let isWatching = false;   // the page of `dubins_rrt watch`: a node plans, and what is dragged is sent when it is let go
 
 // What tests and the curious may read: the number of answers, and the times from mouse to picture [ms].
 const counts = window.dubins = { answers: 0, pictures: 0, latencies: [], view };
@@ -31,6 +32,7 @@ function send(message) {
 // Requests. While something moves they are quick; at rest the search goes on.
 
 function ask(quick) {
+  if (isWatching) { return; }
   dirty = { quick };
   flush();
   clearTimeout(restTimer);
@@ -60,6 +62,9 @@ function chosen() {
 const receivers = {
   hello(message) {
     options = message.options;
+    isWatching = message.watch === true;
+    document.body.classList.toggle("watching", isWatching);
+    if (isWatching) { options.settings = [...options.vehicle, ...options.settings]; changed = {}; }
     showFiles(message.files);
     makeSettings();
   },
@@ -69,6 +74,7 @@ const receivers = {
     view.stroke = null;
     $("title").textContent = message.name;
     if (message.new) {
+      if (isWatching) { view.fit(); return; }
       [view.start, view.goal] = known && known.map === message.name ? [known.start, known.goal] : [message.start, message.goal];
       view.via = known && known.map === message.name && known.via ? known.via : [];
       view.answer = view.first = view.tree = null;
@@ -94,6 +100,18 @@ const receivers = {
     }
     showFigures(message);
   },
+  poses(message) {
+    if (held) { return; }
+    for (const name of ["start", "goal"]) { view[name] = message[name] || view[name]; }
+    view.request();
+  },
+  parameters({ values }) {
+    changed = { settings: values, problem: values };
+    const corners = values.footprint ? JSON.parse(values.footprint) : [];
+    view.vehicle = { footprint: corners, radius: values.robot_radius };
+    if (!$("settings").contains(document.activeElement)) { makeSettings(); }
+    view.request();
+  },
   refused(message) { sent.clear(); $("note").textContent = message.message; flush(); },
   saved(message) { showFiles(message.files); $("note").textContent = `Saved as ${message.name}.`; },
   copy(message) {
@@ -116,7 +134,7 @@ function receive(data) {
 }
 
 function showFigures(answer) {
-  const metres = (value) => (value === null ? "–" : `${value.toFixed(2)} m`), time = (value) => (value === null ? "–" : `${(1000 * value).toFixed(1)} ms`);
+  const metres = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)} m`), time = (value) => (value === null ? "–" : `${(1000 * value).toFixed(1)} ms`);
   const percent = answer.gap === null ? "–" : `${(100 * answer.gap).toFixed(1)} %`;
   $("title").textContent = answer.length === null ? `No path: ${answer.status}` : `Path of ${answer.length.toFixed(2)} m`;
   $("message").textContent = answer.length === null ? answer.message : "";
@@ -178,6 +196,7 @@ function setting(group, item) {
   input.id = item.name;
   input.onchange = () => {
     const now = input.type === "checkbox" ? input.checked : input.type === "number" ? Number(input.value) : input.value;
+    if (isWatching) { send({ type: "set", name: item.name, value: now }); return; }
     changed[group] = { ...changed[group], [item.name]: now };
     if (now === item.default) { delete changed[group][item.name]; }
     ask(false);
@@ -207,6 +226,7 @@ for (const button of document.querySelectorAll("[data-tool]")) {
   };
 }
 $("drive").onclick = () => view.drive();
+$("cancel").onclick = () => send({ type: "cancel" });
 $("fit").onclick = () => view.fit();
 
 // Mouse and touch.
@@ -255,13 +275,16 @@ $("canvas").onpointermove = (event) => {
 
 $("canvas").onpointerup = $("canvas").onpointercancel = () => {
   if (held && held.kind === "via" && !held.isNew && !held.moved) { view.via.splice(held.number, 1); view.request(); }
-  if (held && held.kind === "stroke") { sendStroke(true); } else if (held && held.kind !== "pan") { ask(false); }
+  if (held && held.kind === "stroke") { sendStroke(true); }
+  else if (held && held.kind !== "pan") { if (isWatching) { sendPose(held.name || "goal"); } else { ask(false); } }
   held = null;
 };
 
 $("canvas").oncontextmenu = (event) => event.preventDefault();
 $("canvas").ondblclick = () => view.fit();
 $("canvas").addEventListener("wheel", (event) => { event.preventDefault(); view.zoom(Math.exp(-event.deltaY / 400), ...place(event)); }, { passive: false });
+
+function sendPose(name) { send({ type: "pose", name, pose: view[name], via: view.via }); }
 
 function setPose(name, pose) {
   view[name] = pose;
@@ -290,6 +313,7 @@ $("canvas").onkeydown = (event) => {
   else if (key === "s" || key === "g") { view.selected = key === "s" ? "start" : "goal"; view.request(); }
   else if (key === "+" || key === "-") { view.zoom(key === "+" ? 1.25 : 0.8, ...middle); }
   else if (key === "0") { view.fit(); }
+  else if (key === "Enter" && isWatching) { sendPose(view.selected); }
   else { return; }
   event.preventDefault();
 };
@@ -298,7 +322,7 @@ $("canvas").onkeydown = (event) => {
 
 function remember() {
   const form = Object.fromEntries(["turning_radius", "shape", "robot_radius", "ahead", "behind", "width"].map((id) => [id, $(id).value]));
-  if (view.map) { sessionStorage.setItem(STORE, JSON.stringify({ map: view.map.name, start: view.start, goal: view.goal, via: view.via, form, changed })); }
+  if (view.map && !isWatching) { sessionStorage.setItem(STORE, JSON.stringify({ map: view.map.name, start: view.start, goal: view.goal, via: view.via, form, changed })); }
 }
 
 function recall() {

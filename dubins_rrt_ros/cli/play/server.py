@@ -8,11 +8,9 @@ import asyncio
 import secrets
 from collections.abc import Awaitable, Callable
 from importlib import resources
+from typing import Protocol
 
 from aiohttp import WSMsgType, web
-
-from .session import Session
-from .workbench import Workbench
 
 HOST = "127.0.0.1"
 #: Maximum length of a message of the page [bytes].
@@ -30,6 +28,20 @@ HEADERS = {
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
+class PageSession(Protocol):
+    """What serves one page."""
+
+    def take(self, text: str) -> None:
+        """Take a message of the page."""
+
+    async def close(self) -> None:
+        """End, as the page has gone."""
+
+
+#: Takes a function that sends a text or bytes to a page, from any thread, and returns what serves the page.
+MakeSession = Callable[[Callable[[str | bytes], None]], PageSession]
+
+
 class PlayServer:
     """A server on 127.0.0.1.
 
@@ -38,10 +50,10 @@ class PlayServer:
         token: what a page must know to be served.
     """
 
-    def __init__(self, workbench: Workbench, token: str = ""):
+    def __init__(self, make_session: MakeSession, token: str = ""):
         self.port = 0
         self.token = token or secrets.token_urlsafe(24)
-        self._workbench = workbench
+        self._make_session = make_session
         self._runner: web.AppRunner | None = None
         self._pages: set[web.WebSocketResponse] = set()
 
@@ -90,7 +102,7 @@ class PlayServer:
         self._pages.add(page)
         outbox: asyncio.Queue[str | bytes] = asyncio.Queue()
         loop = asyncio.get_running_loop()
-        session = Session(self._workbench, lambda message: _put(loop, outbox, message))
+        session = self._make_session(lambda message: _put(loop, outbox, message))
         sender = asyncio.create_task(_send_all(page, outbox))
         try:
             async for message in page:
