@@ -73,7 +73,7 @@ def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, 
 
     The time limit is lifted to the largest allowed, and the sample budget is what was drawn: a deadline and a
     cancellation only cut the sequence of samples short, so the same number of them gives the same path on a machine of
-    any speed. Where nothing was drawn, the budget stays as it was.
+    any speed. So does a proof, which is not made again. Where nothing was drawn, the budget stays as it was.
 
     Raises:
         PlanFileError: something is missing, or is of another type.
@@ -86,7 +86,8 @@ def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, 
     problem = Problem(world_map, vehicle, start, goal, **request)
     fields = _known(Settings, BEFORE | fields, "settings")
     drawn = _field(document, "samples", int)
-    return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"]})
+    return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"],
+                                          "stop_gap": 0.0})
 
 
 def read_waypoints(document: Mapping[str, Any]) -> tuple[Waypoint, ...]:

@@ -3,21 +3,22 @@
 import math
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from .answer import LEAST_IMPROVEMENT, AuditedPath, success_message
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
-from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import find_departure
 from .diagnosis import explain
 from .problem import Problem
+from .proof.background_proof import BackgroundProof
 from .result import Plan, Progress, Status, gap_above, reaches_goal
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
@@ -33,10 +34,6 @@ from .world import World, prepare
 REPORT_INTERVAL = 0.05
 #: Poses this close are the same [m, rad]: what lies between them is rounding, of quaternions and the like.
 SAME = 1e-9
-#: A path shorter by less than this is no improvement [m].
-LEAST_IMPROVEMENT = 1e-6
-#: What may find a path, by the values of `Plan.found_by`.
-ALGORITHMS = {"hybrid_astar": "hybrid A*", "rrt": "RRT", "rrt_star": "RRT*", "seed_path": "the seed path"}
 #: Minimum time between two audits of improvements, in times that the last one took: the search has the rest.
 AUDIT_INTERVAL = 5
 #: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
@@ -92,30 +89,6 @@ def _ignore(progress: Progress) -> None:
     pass
 
 
-@dataclass(frozen=True, eq=False)
-class _Audited:
-    """A path that passed its audit, with the search as it was then.
-
-    Attributes:
-        cost: the cost of the path [m].
-        found: the best path of the search, of which this one is a simpler form, or the same.
-        is_simple: False where the path was not simplified, since the first one is not to wait for that.
-    """
-
-    path: Path
-    audit: Audit
-    tree: Tree
-    samples: int
-    found_by: str = ""
-    cost: float = 0.0
-    found: Path | None = None
-    is_simple: bool = True
-
-    def improves(self, other: "_Audited | None") -> bool:
-        """Return True if this is worth a report after the other."""
-        return other is None or self.is_simple > other.is_simple or self.cost < other.cost - LEAST_IMPROVEMENT
-
-
 class _Call:
     """One call of plan(), with its clock."""
 
@@ -128,13 +101,14 @@ class _Call:
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
         self._bound = self._cost_bound = lower_bound(problem)
         self._obstacles: Obstacles | None = None  # until the world is ready
-        self._best: _Audited | None = None
+        self._best: AuditedPath | None = None
         self._audit_took = self._simplifying_took = 0.0
         self._found_cost = math.inf  # of the best path of the search that was audited last
         self._last_audit, self._last_report = -math.inf, 0.0  # when they ended [s]
         self._time_to_first: float | None = None
         self._time_to_found: float | None = None
         self._map_time = 0.0
+        self._proof: BackgroundProof | None = None
 
     @property
     def _elapsed(self) -> float:
@@ -198,9 +172,21 @@ class _Call:
                 deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
             self._report(search)
             deadline.poll()
-            if deadline.is_over or (may_end and deadline.is_due):
+            if deadline.is_over or (may_end and (deadline.is_due or self._is_proved(search, field))):
                 break
         return self._end_of(search, field)
+
+    def _is_proved(self, search: Search, field: ClearanceField) -> bool:
+        """Return True if the best path is proved to be as near to the shortest, or the cheapest, possible as asked for."""
+        gap = self._settings.stop_gap
+        if self._best is None or gap == 0:
+            return False
+        if self._settings.preferred_clearance_of(self._problem.vehicle) > 0:
+            return search.bound is not None and self._best.cost <= (1 + gap) * lower_bound(self._problem, search.bound)
+        if self._proof is None:
+            self._proof = BackgroundProof(self._problem, field, self._best.path, gap, lambda: self._deadline.is_over)
+        self._proof.follow(self._best.path.length)
+        return self._proof.holds
 
     def _usable_seed(self, field: ClearanceField) -> Path | None:
         """Return the path that the seed path gives for this problem, if it does."""
@@ -247,7 +233,7 @@ class _Call:
             return True
         return False
 
-    def _audited(self, path: Path, search: Search, simplify: bool = True, is_last: bool = False) -> _Audited:
+    def _audited(self, path: Path, search: Search, simplify: bool = True, is_last: bool = False) -> AuditedPath:
         """Simplify and audit a path once: an improvement that was reported is often the answer too."""
         simple = path
         if simplify and not search.objective.is_length:
@@ -256,7 +242,7 @@ class _Call:
         if is_last:
             simple = search.without_short_arcs(simple)
         self._found_cost = search.cost
-        return _Audited(simple, self._audit(simple), search.tree_with(simple), search.samples, search.found_by,
+        return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.found_by,
                         search.objective.path_cost(simple), path, simplify or search.objective.is_length)
 
     def _simplified(self, search: Search) -> Path:
@@ -278,7 +264,7 @@ class _Call:
         self._deadline.reserve = AUDIT_RESERVE * self._audit_took + self._simplifying_took
         return audit
 
-    def _keep(self, audited: _Audited) -> None:
+    def _keep(self, audited: AuditedPath) -> None:
         self._best = audited
         if self._time_to_first is None:
             self._time_to_first = self._elapsed
@@ -313,7 +299,7 @@ class _Call:
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
         """Return the plan with the best path; without it where it fails its audit, with the one before where the time is up."""
         try:
-            audited = self._audited(path, search, is_last=True) if search else _Audited(path, self._audit(path), tree, samples)
+            audited = self._audited(path, search, is_last=True) if search else AuditedPath(path, self._audit(path), tree, samples)
         except OutOfTime:
             cancelled = cancelled or self._deadline.cancelled
             return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples, cancelled)
@@ -324,6 +310,9 @@ class _Call:
         if search and (bound := search.make_bound(self._time_for_bound())):
             self._cost_bound = lower_bound(self._problem, bound)
             self._bound = lower_bound(self._problem, search.make_length_bound())
+        if self._proof:
+            self._proof.follow(path.length)
+            self._bound = max(self._bound, self._proof.finish(0.0 if cancelled else self._deadline.left))
         return self._with_path(self._best or audited, cancelled)
 
     def _time_for_bound(self) -> float:
@@ -362,40 +351,16 @@ class _Call:
         of_budget = f" of {self._settings.samples}" if samples <= self._settings.samples else ""
         return f"{samples}{of_budget} samples drawn, {tree}, {self._elapsed:.3g} s"
 
-    def _with_path(self, best: _Audited, cancelled: bool = False, running: bool = False) -> Plan:
+    def _with_path(self, best: AuditedPath, cancelled: bool = False, running: bool = False) -> Plan:
         """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
         bound, cost_bound, elapsed = min(self._bound, best.path.length), min(self._cost_bound, best.cost), self._elapsed
-        message = self._success_message(best, bound, cost_bound, elapsed, cancelled, running)
+        proved = self._proof is not None and gap_above(bound, best.path.length) <= self._settings.stop_gap + SAME
+        message = success_message(self._problem, self._settings, best, (bound, cost_bound), elapsed, cancelled=cancelled,
+                                  running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
                           audit=best.audit, found_by=best.found_by, lower_bound=bound, cost=best.cost,
                           cost_lower_bound=cost_bound, planning_time=elapsed)
-
-    def _success_message(self, best: _Audited, bound: float, cost_bound: float, elapsed: float, cancelled: bool, running: bool
-                         ) -> str:
-        """Return what was found, in a sentence."""
-        path, found_by, samples = best.path, best.found_by, best.samples
-        so_far = " so far" if running else ""
-        gap = gap_above(bound, path.length)
-        least = "the Dubins curve without obstacles" if self._problem.vehicle.required_clearance < 0 else "the shortest possible"
-        above = f", at most {100 * gap:.1f} % above {least}" if math.isfinite(gap) else ""
-        if self._settings.preferred_clearance_of(self._problem.vehicle) > 0:
-            gap = gap_above(cost_bound, best.cost)
-            above = f" with a cost of {best.cost:.2f} m"
-            above += f", at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else ""
-        end = "cancelled after " if cancelled else "after "
-        before = f"{'cancelled ' if cancelled else ''}before the first sample"
-        drawn = f"{end}{samples} sample{'' if samples == 1 else 's'}" if samples else before
-        found = f", found by {ALGORITHMS[found_by]}" if found_by else ""
-        message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {drawn} in {elapsed:.3g} s"
-        if self._problem.vehicle.required_clearance < 0:
-            message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
-        if self._problem.exact_goal:
-            return message + "."
-        off, turned = position_error(path.end, self._problem.goal), heading_error(path.end, self._problem.goal)
-        if self._problem.any_goal_heading:
-            return f"{message}; it ends {off:.3f} m from the goal, with the heading {path.end[2]:.3f} rad."
-        return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
         figures = {"lower_bound": self._bound, "cost_lower_bound": self._cost_bound, "planning_time": self._elapsed} | more

@@ -45,6 +45,8 @@ class Settings:
     path_spacing: float = option(0.0, "maximum distance between two poses of a published path; 0 is the smaller of a cell (of a "
                                  "polygon map a quarter of the inscribed radius) and a tenth of the turning radius, and at least "
                                  "0.01", unit="m", low=0.0, high=1000.0)
+    stop_gap: float = option(0.0, "end as soon as the path is proved to be at most this share longer than the shortest possible; "
+                             "0 is never", low=0.0, high=1.0)
     seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
 
     def __post_init__(self) -> None:

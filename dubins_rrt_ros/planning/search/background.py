@@ -64,7 +64,8 @@ class BackgroundExecutor:
         self._pool = None
 
 
-#: The executor of this process.
-BACKGROUND = BackgroundExecutor()
+#: The executors of this process: for the searches, and for proofs, for which no search may have to wait.
+BACKGROUND, PROOFS = BackgroundExecutor(), BackgroundExecutor()
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=BACKGROUND.forget_threads)
+    for executor in (BACKGROUND, PROOFS):
+        os.register_at_fork(after_in_child=executor.forget_threads)

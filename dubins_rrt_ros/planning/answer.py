@@ -1,0 +1,81 @@
+"""An audited path, which is the answer to a request, and the sentence that tells of it."""
+
+import math
+from dataclasses import dataclass
+
+from .audit.verdict import Audit
+from .curves.angles import heading_error, position_error
+from .curves.path import Path
+from .diagnosis import explain
+from .problem import Problem
+from .result import gap_above
+from .search.tree import Tree
+from .settings import Settings
+
+#: What may find a path, by the values of `Plan.found_by`.
+ALGORITHMS = {"hybrid_astar": "hybrid A*", "rrt": "RRT", "rrt_star": "RRT*", "seed_path": "the seed path"}
+#: A path shorter by less than this is no improvement [m].
+LEAST_IMPROVEMENT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class AuditedPath:
+    """A path that passed its audit, with the search as it was then.
+
+    Attributes:
+        cost: the cost of the path [m].
+        found: the best path of the search, of which this one is a simpler form, or the same.
+        is_simple: False where the path was not simplified, since the first one is not to wait for that.
+    """
+
+    path: Path
+    audit: Audit
+    tree: Tree
+    samples: int
+    found_by: str = ""
+    cost: float = 0.0
+    found: Path | None = None
+    is_simple: bool = True
+
+    def improves(self, other: "AuditedPath | None") -> bool:
+        """Return True if this is worth a report after the other."""
+        return other is None or self.is_simple > other.is_simple or self.cost < other.cost - LEAST_IMPROVEMENT
+
+
+def success_message(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], elapsed: float, *,
+                    cancelled: bool, running: bool, proved: bool) -> str:
+    """Return what was found, in a sentence.
+
+    Args:
+        bounds: lower bounds of the length and of the cost [m].
+        elapsed: time since the request began [s].
+        running: True while the search goes on.
+        proved: True if the gap is the one that was to be proved.
+    """
+    path, samples = answer.path, answer.samples
+    so_far = " so far" if running else ""
+    above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved else "")
+    found = f", found by {ALGORITHMS[answer.found_by]}" if answer.found_by else ""
+    drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample"
+    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {'cancelled ' if cancelled else ''}{drawn} in {elapsed:.3g} s"
+    if problem.vehicle.required_clearance < 0:
+        message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
+    if problem.exact_goal:
+        return message + "."
+    off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)
+    if problem.any_goal_heading:
+        return f"{message}; it ends {off:.3f} m from the goal, with the heading {path.end[2]:.3f} rad."
+    return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
+
+
+def _above_the_least(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], proved: str) -> str:
+    """Return how far the path is above the shortest, or the cheapest, possible at most."""
+    if settings.preferred_clearance_of(problem.vehicle) > 0:
+        gap = gap_above(bounds[1], answer.cost)
+        cost = f" with a cost of {answer.cost:.2f} m"
+        return cost + (f", at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else "")
+    gap = gap_above(bounds[0], answer.path.length)
+    if not math.isfinite(gap):
+        return ""
+    least = "the Dubins curve without obstacles" if problem.vehicle.required_clearance < 0 else "the shortest possible"
+    return f", {proved}at most {100 * gap:.{1 if gap > 0.001 else 2}f} % above {least}"

@@ -1,0 +1,174 @@
+"""The proof of a path's length: no bound is above a path, whichever way round; and a search that it ends."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from support.cases import needs_compiled, random_maps, random_problem, scaled
+
+from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan, prepare
+from dubins_rrt_ros.planning._kernels.dubins import shortest_lengths
+from dubins_rrt_ros.planning._kernels.interval_curves import bounds_between, shortest_of_intervals
+from dubins_rrt_ros.planning.deadline import never
+from dubins_rrt_ros.planning.maps.locate import maps_directory
+from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.proof.length_proof import LengthProof
+from dubins_rrt_ros.planning.proof.level_sets import LevelSets
+
+START, GOAL = (1.5, 2.0, 1.57), (13.5, 10.5, 1.57)
+
+
+@pytest.fixture(scope="module")
+def maze():
+    return Problem(prepare(load_map(maps_directory() / "maze.yaml"), Vehicle()), start=START, goal=GOAL)
+
+
+def rounds(number):
+    """An `interrupted` that ends a proof after some looks at it."""
+    count = itertools.count()
+    return lambda: next(count) >= number
+
+
+def lengths_between(starts, goals, radius):
+    out = np.empty(len(starts))
+    shortest_lengths(np.ascontiguousarray(starts), np.ascontiguousarray(goals), radius, out)
+    return out
+
+
+def test_no_curve_between_intervals_of_headings_is_shorter():
+    """Against the shortest of many curves with headings in the intervals, their ends included."""
+    rng = np.random.default_rng(4)
+    shares = np.array(list(itertools.product(np.linspace(-1, 1, 13), repeat=2)))
+    for _ in range(scaled(1500, least=60)):
+        distance = rng.choice([0.01, 0.5, 2, 4, 8]) * rng.random() + 1e-3
+        (start, end), halves = rng.uniform(-4, 4, 2), rng.choice([0, 0.05, 0.5, 1.5, math.pi], 2) * rng.random(2)
+        radius = rng.uniform(0.3, 2)
+        least = shortest_of_intervals(distance, start, halves[0], end, halves[1], radius)
+        starts = np.column_stack([np.zeros((len(shares), 2)), start + halves[0] * shares[:, 0]])
+        goals = np.column_stack([np.full(len(shares), distance), np.zeros(len(shares)), end + halves[1] * shares[:, 1]])
+        sampled = lengths_between(starts, goals, radius).min()
+        assert least <= sampled + 1e-9
+        assert least >= distance - 1e-9
+
+
+def test_the_shortest_curve_between_intervals_exists():
+    """Where the intervals are narrow it is about as long as the curve between their middles."""
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        distance, (start, end) = rng.uniform(5, 9), rng.uniform(-3, 3, 2)
+        least = shortest_of_intervals(distance, start, 1e-6, end, 1e-6, 1.0)
+        whole = lengths_between(np.array([[0, 0, start]]), np.array([[distance, 0, end]]), 1.0)[0]
+        assert least == pytest.approx(whole, abs=1e-4)
+
+
+def test_no_curve_between_boxes_is_shorter():
+    rng = np.random.default_rng(6)
+    for _ in range(scaled(300, least=10)):
+        angles, radius = rng.uniform(-4, 4, 4), rng.uniform(0.2, 2)
+        boxes = np.array([[*rng.uniform(-4, 4, 2), math.cos(angle), math.sin(angle), *rng.uniform(0, [0.5, 0.2]), heading,
+                           rng.uniform(0, 1)] for angle, heading in (angles[:2], angles[2:])])
+        out = np.empty(1)
+        bounds_between(boxes[:1], boxes[1:], radius, out)
+        assert out[0] <= lengths_between(*(poses_in(box, rng, 400) for box in boxes), radius).min() + 1e-9
+
+
+def poses_in(box, rng, number):
+    """Random poses in a box, its corners among them."""
+    along, across, turn = np.clip(rng.uniform(-1.5, 1.5, (3, number)), -1, 1)
+    x, y, c, s, length, width, heading, half = box
+    return np.column_stack([x + c * length * along - s * width * across, y + s * length * along + c * width * across,
+                            heading + half * turn])
+
+
+def test_the_pieces_of_a_level_are_where_the_cost_is_the_level(maze):
+    sets = LevelSets(maze, maze.world.field)
+    for level in (2.0, 7.3, 15.0):
+        pieces = sets.pieces(level, math.inf)
+        for share in (0.1, 0.5, 0.9):  # the ends are on the edges of squares, where the next one need not be free
+            points = (1 - share) * pieces.ends[:, :2] + share * pieces.ends[:, 2:]
+            np.testing.assert_allclose(sets.costs(points), level, atol=1e-6)
+        middles = (pieces.ends[:, :2] + pieces.ends[:, 2:]) / 2
+        uphill = middles + 1e-4 * np.column_stack([np.cos(pieces.gradients), np.sin(pieces.gradients)])
+        risen = sets.costs(uphill)
+        assert np.mean(risen > level) > 0.95  # the others are on a triangle's edge, or at an obstacle
+
+
+@needs_compiled
+def test_every_path_crosses_the_levels_in_order(maze):
+    sets = LevelSets(maze, maze.world.field)
+    path = plan(maze, Settings(seed=2, samples=200)).path
+    costs = sets.costs(path.poses(0.01)[:, :2])
+    for level in np.arange(1.0, sets.end, 1.0):
+        first = np.argmax(costs >= level)
+        points = path.poses(0.01)[first, :2]
+        ends = sets.pieces(level, math.inf).ends
+        assert np.hypot(*((ends[:, :2] + ends[:, 2:]) / 2 - points).T).min() < 0.15
+
+
+@needs_compiled
+def test_the_gap_of_the_maze_is_closed(maze):
+    """The bound by the eikonal equation is 5 % below the path."""
+    result = plan(maze, Settings(seed=1, samples=3000))
+    assert result.gap > 0.04
+    proof = LengthProof(maze, maze.world.field, result.path)
+    proof.run(rounds(400), gap=0.015)
+    assert result.length / 1.015 - 1e-9 <= proof.bound <= result.length
+
+
+@needs_compiled
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_no_bound_is_above_a_path_on_random_problems(seed):
+    """Also where the proof is asked for more than is true: it takes the path for longer than it is."""
+    rng, maps, judged = np.random.default_rng(300 + seed), random_maps(30), 0
+    for number in range(40):
+        loose, _ = random_problem(rng, maps[number % 30])
+        if loose.vehicle.required_clearance <= 0:
+            continue
+        world = prepare(loose.map, loose.vehicle, loose.allow_unknown)
+        problem = Problem(world, start=loose.start, goal=loose.goal, goal_tolerance_xy=loose.goal_tolerance_xy,
+                          goal_tolerance_yaw=loose.goal_tolerance_yaw, any_goal_heading=loose.any_goal_heading)
+        result = plan(problem, Settings(seed=seed, samples=2000, planning_time=0.5))
+        if not result.solved or result.length < 0.5:
+            continue
+        judged += 1
+        for factor in (1.0, 1.3):
+            proof = LengthProof(problem, world.field, result.path, limit=factor * result.length)
+            proof.length = factor * result.length
+            proof.run(rounds(60))
+            assert proof.bound <= result.length * (1 + 1e-9), (seed, number, factor)
+    assert judged >= 5
+
+
+@needs_compiled
+def test_a_search_ends_as_soon_as_its_path_is_proved(maze):
+    settings = Settings(seed=1, samples=10_000_000, planning_time=60.0, stop_gap=0.02)
+    result = plan(maze, settings)
+    assert result.gap <= 0.02 + 1e-9
+    assert result.planning_time < 60
+    assert "proved to be at most " in result.message
+    assert 0 < result.samples < settings.samples
+    again = plan(*read_request(to_document(result, "maze"), maze.map))
+    assert again.path == result.path
+
+
+@needs_compiled
+def test_on_one_core_the_proof_follows_the_search(maze, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.background.cores", lambda: 1)
+    result = plan(maze, Settings(seed=1, samples=3000, planning_time=60.0, stop_gap=0.03))
+    assert result.gap <= 0.03 + 1e-9
+    assert result.path == plan(maze, Settings(seed=1, samples=result.samples, planning_time=60.0)).path
+
+
+@needs_compiled
+def test_a_proof_that_cannot_be_had_ends_with_the_time(maze):
+    result = plan(maze, Settings(seed=1, samples=1000, planning_time=0.3, stop_gap=1e-9))
+    assert result.solved
+    assert "proved" not in result.message
+    assert result.lower_bound <= result.length
+
+
+def test_without_a_gap_to_stop_at_nothing_is_proved(maze, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.BackgroundProof", never)
+    assert plan(maze, Settings(seed=1, samples=scaled(200))).solved
