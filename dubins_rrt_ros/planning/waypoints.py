@@ -37,7 +37,7 @@ from .world import World, prepare
 #: Number of headings that are tried at a waypoint.
 HEADINGS = 72
 #: Number of headings at either end with which a leg between obstacles is planned first.
-FIRST_HEADINGS = 4
+FIRST_HEADINGS = 12
 #: Maximum number of times that legs are planned between the headings that were chosen, and the headings chosen again.
 ROUNDS = 4
 #: Maximum number of poses that hybrid A* expands for such a path, and number in one step.
