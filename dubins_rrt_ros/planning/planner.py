@@ -218,7 +218,7 @@ class _Call:
         if self._best is None:
             return True
         return (search.cost < self._found_cost - LEAST_IMPROVEMENT
-                and self._elapsed - self._last_audit >= AUDIT_INTERVAL * self._audit_took)
+                and self._elapsed - self._last_audit >= AUDIT_INTERVAL * (self._audit_took + self._simplifying_took))
 
     def _is_right(self, path: Path | None, search: Search) -> bool:
         """Audit the best path of a search, and keep it where it is right; False too where the time does not suffice."""

@@ -10,12 +10,14 @@ cdef class EdgeCost:
     cdef readonly double weight
     # The arc under way.
     cdef Pose pose
+    cdef double room_here
     cdef double sine
     cdef double cosine
     cdef double radius
     cdef int turn
     cdef double of(self, Pose pose, double radius, Curve curve, double limit) noexcept nogil
-    cdef double excess_of_arc(self, Pose pose, double radius, int turn, double length, double limit) noexcept nogil
+    cdef double excess_of_arc(self, double length, double limit) noexcept nogil
+    cdef void begin_arc(self, Pose pose, int turn) noexcept nogil
     cdef double room_at(self, double s) noexcept nogil
     cdef double rate_at(self, double s) noexcept nogil
     cdef double rate(self, double room) noexcept nogil

@@ -37,10 +37,12 @@ else:
     from .dubins import UNLIMITED, Curve, Pose, arc_length, drive, drive_from, length_of, turn_of
     from .room import Room
 
-#: Length of the pieces that are integrated, before they are halved, in preferred clearances.
+#: Way of the vehicle's fastest point along a piece that is integrated, before it is halved, in preferred clearances.
 PIECE = cython.declare(cython.double, 1)
 #: Maximum difference between the two rules over a piece, relative to its cost; the better one is off by a fraction of that.
 PRECISION = cython.declare(cython.double, 1e-3)
+#: Room that has not been asked for.
+UNKNOWN = cython.declare(cython.double, -UNLIMITED)
 #: Maximum number of times that a piece is halved.
 HALVINGS = cython.declare(cython.int, 6)
 
@@ -66,27 +68,34 @@ class EdgeCost:
             return length
         cost: cython.double = length
         arc: cython.int
-        turn: cython.int
+        self.radius = radius
+        self.room_here = UNKNOWN
         for arc in range(3):
             if cost >= limit:
                 break
             length = arc_length(curve, arc)
             if length > 0:
-                turn = turn_of(curve.word, arc)
-                cost += self.excess_of_arc(pose, radius, turn, length, limit - cost)
-                pose = drive(pose, radius, turn, length)
+                self.begin_arc(pose, turn_of(curve.word, arc))
+                cost += self.excess_of_arc(length, limit - cost)
+                pose = drive(pose, radius, self.turn, length)
         return cost
 
-    def excess_of_arc(self, pose, radius, turn, length, limit):
-        """Return by how much the cost of an arc exceeds its length, or a lower bound of that that is at least `limit`."""
-        self.pose, self.radius, self.turn = pose, radius, turn
+    def begin_arc(self, pose, turn):
+        """Begin an arc at a pose, whose room is `room_here`, if that is known."""
+        self.pose, self.turn = pose, turn
         self.sine, self.cosine = sin(pose.theta), cos(pose.theta)
-        piece: cython.double = PIECE * self.preferred_clearance
-        speed: cython.double = self.room.speed(radius, turn)
+        if self.room_here == UNKNOWN:
+            self.room_here = self.room_at(0)
+
+    def excess_of_arc(self, length, limit):
+        """Return by how much the cost of the arc exceeds its length, or a lower bound of that that is at least `limit`."""
+        speed: cython.double = self.room.speed(self.radius, self.turn)
+        piece: cython.double = PIECE * self.preferred_clearance / speed
         excess: cython.double = 0
         s: cython.double = 0
-        room: cython.double = self.room_at(0)
+        room: cython.double = self.room_here
         rate: cython.double
+        self.room_here = UNKNOWN
         ahead: cython.double
         while s < length:
             ahead = (room - self.preferred_clearance) / speed
@@ -103,6 +112,8 @@ class EdgeCost:
             if excess >= limit:
                 break
             s += ahead
+            if s >= length:
+                self.room_here = room
         return excess
 
     def room_at(self, s):

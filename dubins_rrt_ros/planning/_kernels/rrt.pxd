@@ -37,4 +37,5 @@ cdef class RrtKernel:
     cdef bint steer(self, Pose sample) noexcept nogil
     cdef int choose_parent(self, Pose pose, int node, double limit) noexcept nogil
     cdef void rewire(self, int node, double radius) noexcept nogil
+    cdef double cost_if_free(self, Pose pose, Curve curve, double limit) noexcept nogil
     cdef int add(self, Pose pose, int parent, Curve curve, double cost) noexcept nogil

@@ -257,14 +257,11 @@ class RrtKernel:
             parent = self.backward.nodes[next_one]
             begin = self.tree.pose_of(parent)
             self.backward.keys[next_one] = UNLIMITED
-            if not self.checker.motion_is_free(begin, self.tree.radius, self.backward.curve_at(next_one)):
-                continue
-            cost = self.edge_cost.of(begin, self.tree.radius, self.backward.curve_at(next_one), limit - self.tree.costs[parent])
-            if self.edge_cost.is_length:  # which orders the edges by their costs
-                best, edge = next_one, cost
-                break
-            if cost < limit - self.tree.costs[parent]:
+            cost = self.cost_if_free(begin, self.backward.curve_at(next_one), limit - self.tree.costs[parent])
+            if cost < UNLIMITED:
                 limit, best, edge = self.tree.costs[parent] + cost, next_one, cost
+                if self.edge_cost.is_length:  # which orders the edges by their costs
+                    break
         if best < 0:
             return -1
         if node < 0:
@@ -282,12 +279,21 @@ class RrtKernel:
         self.forward.collect_cheaper(node, radius, LEAST_GAIN)
         for i in range(self.forward.count):
             near = self.forward.nodes[i]
-            if (self.tree.costs[node] + self.forward.keys[i] < self.tree.costs[near] - LEAST_GAIN
-                    and self.checker.motion_is_free(pose, self.tree.radius, self.forward.curve_at(i))):
+            if self.tree.costs[node] + self.forward.keys[i] < self.tree.costs[near] - LEAST_GAIN:
                 budget = self.tree.costs[near] - LEAST_GAIN - self.tree.costs[node]
-                cost = self.edge_cost.of(pose, self.tree.radius, self.forward.curve_at(i), budget)
-                if self.edge_cost.is_length or cost < budget:
+                cost = self.cost_if_free(pose, self.forward.curve_at(i), budget)
+                if cost < UNLIMITED:
                     self.tree.reparent(near, node, self.forward.curve_at(i), cost)
+
+    def cost_if_free(self, pose, curve, limit):
+        """Return the cost of a curve from a pose; UNLIMITED where it is not free, or where its integral is not below a limit."""
+        if self.edge_cost.is_length:  # which was compared with the limit before
+            return length_of(curve) if self.checker.motion_is_free(pose, self.tree.radius, curve) else UNLIMITED
+        # In this order, as the integral ends soon where the limit is tight.
+        cost: cython.double = self.edge_cost.of(pose, self.tree.radius, curve, limit)
+        if cost >= limit or not self.checker.motion_is_free(pose, self.tree.radius, curve):
+            return UNLIMITED
+        return cost
 
     def add(self, pose, parent, curve, cost):
         """Add a node, to the goal nodes too if it reaches the goal."""

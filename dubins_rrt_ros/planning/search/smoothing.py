@@ -14,14 +14,15 @@ from ..vehicle import Vehicle
 from .cost import Objective
 from .pace import Pace
 
-#: Number of changes that are tried in one round.
-TRIES = 512
+#: Number of changes that are tried in one round, and where the cost is not the length, which takes several times as long.
+TRIES, COSTLY_TRIES = 512, 256
 #: Number of changes in the first slice of a round, after which the time is looked at.
 FIRST_SLICE = 4
 #: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
 FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
-#: Price of a curve of a path that is published, in turning radii, and number of rounds that simplify it.
-PRICE, SIMPLIFICATIONS = 0.005, 4
+#: Price of a curve of a path that is published, in turning radii; number of changes that are tried in a round that simplifies it,
+#: and maximum number of rounds: one that saves less than a curve is the last.
+PRICE, SIMPLIFYING_TRIES, SIMPLIFICATIONS = 0.005, 128, 12
 #: Minimum gain of a round, relative to the cost, that makes another one worthwhile.
 WORTHWHILE_GAIN = 1e-4
 
@@ -37,18 +38,19 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
         objective: the cost; None makes it the length.
         price: what a curve more may save [m]; without effect where the cost is the length.
     """
-    draws = np.column_stack([rng.random((TRIES, 4)), rng.normal(size=(TRIES, 2))])
     edge_cost = (objective or Objective(vehicle, field)).edge_cost()
+    tries = TRIES if edge_cost.is_length else SIMPLIFYING_TRIES if price > 0 else COSTLY_TRIES
+    draws = np.column_stack([rng.random((tries, 4)), rng.normal(size=(tries, 2))])
     shortcutter = Shortcutter(checker=field.collision_checker(vehicle), edge_cost=edge_cost, radius=path.radius,
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
-                              tries=TRIES, price=price)
-    pace, tried, is_left = Pace(FIRST_SLICE, TRIES), 0, True
+                              tries=tries, price=price)
+    pace, tried, is_left = Pace(FIRST_SLICE, tries), 0, True
     while is_left and not interrupted():
         checks = pace.size
         with pace.measured(checks):
             is_left = shortcutter.prepare(checks)
-    while tried < TRIES and not interrupted():
-        begin, tried = tried, min(tried + pace.size, TRIES)
+    while tried < tries and not interrupted():
+        begin, tried = tried, min(tried + pace.size, tries)
         with pace.measured(tried - begin):
             shortcutter.improve(draws, begin, tried, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
     waypoints, words, lengths = (np.array(view[:shortcutter.count])
@@ -81,9 +83,13 @@ class Smoother:
             return path
         rng = np.random.default_rng((self._seed, 4))
         price = PRICE * self._objective.vehicle.maneuver_scale
+        cost, before = self._objective.path_cost(path) + price * len(path.words), math.inf
         for _ in range(SIMPLIFICATIONS):
+            if before - cost < price or self._interrupted():
+                break
             path = smooth(path, self._objective.vehicle, self._objective.field, rng, False, self._interrupted, self._objective,
                           price)
+            before, cost = cost, self._objective.path_cost(path) + price * len(path.words)
         return path
 
     def record(self, before: float, after: float) -> None:
