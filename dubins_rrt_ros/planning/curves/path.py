@@ -136,6 +136,21 @@ class Path:
         lengths[1] = np.clip(arcs - driven, 0.0, self.lengths[i])
         return Path(np.concatenate([start, self.waypoints[i:]]), self.words[i - 1:], lengths, self.radius)
 
+    def arc_lengths(self) -> np.ndarray:
+        """Return the (n,) arc lengths at which the waypoints lie [m]."""
+        return np.append(0.0, np.cumsum(self.lengths[1:].sum(axis=1)))
+
+    def part(self, first: int, last: int) -> "Path":
+        """Return the path from one waypoint to another."""
+        return Path(self.waypoints[first:last + 1], self.words[first:last + 1], self.lengths[first:last + 1], self.radius)
+
+    @classmethod
+    def joined(cls, first: "Path", *others: "Path") -> "Path":
+        """Join paths, each of which ends where the next begins."""
+        return cls(np.concatenate([first.waypoints, *(path.waypoints[1:] for path in others)]),
+                   np.concatenate([first.words, *(path.words[1:] for path in others)]),
+                   np.concatenate([first.lengths, *(path.lengths[1:] for path in others)]), first.radius)
+
     def cut(self, longest: float) -> "Path":
         """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited."""
         if longest == 0 or len(self.words) < 2:

@@ -24,7 +24,7 @@ class CostToGo:
     """
 
     def __init__(self, field: ClearanceField, required_clearance: float, source: tuple[float, float], tolerance: float = 0.0,
-                 target: tuple[float, float] | None = None, objective: Objective | None = None):
+                 target: tuple[float, float] | None = None, objective: Objective | None = None, free: np.ndarray | None = None):
         """Prepare the costs, which are computed as far as they are asked for until `make_bound`.
 
         Args:
@@ -33,8 +33,10 @@ class CostToGo:
             source, tolerance: the ways end within `tolerance` [m] of `source`.
             target: the costs on the way to here are computed first.
             objective: what a metre costs; None makes the costs lengths.
+            free: the squares that ways may lead over, as `ClearanceField.free_squares` has them; None is all that are free.
         """
         cells, squares = field.free_squares(required_clearance)
+        squares = squares if free is None else free
         self._field, self._free, self._objective = field, squares, objective
         self.kernel = CostToGoKernel(clearance=field.kernel, block=cells, free=squares, source=source, tolerance=tolerance,
                                      target=target, slowness=objective.slowness(is_bound=False) if objective else None)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from .._kernels import UNLIMITED
+from .._kernels.collision import CollisionChecker
+from .._kernels.edge_cost import EdgeCost
 from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
 from ..curves.angles import wrap
@@ -123,7 +125,7 @@ class HybridAStarRuns:
             they are compared with it, where the settings allow that.
         """
         run = self._current = self._current or self._next_run(best_cost)
-        self._expand(run, expansions, interrupted)
+        expand(run, self._pace, expansions, interrupted)
         if not run.ended:
             return None
         self._current = None
@@ -139,14 +141,6 @@ class HybridAStarRuns:
         # Not even arcs of all lengths lead anywhere from the start.
         self.exhausted = self.exhausted or (is_first and self._in_vain > len(FIRST_RUNS) and run.size == 1)
         return path
-
-    def _expand(self, run: HybridAStar, expansions: int, interrupted: Callable[[], bool]) -> None:
-        """Expand that many poses, in slices."""
-        while expansions > 0 and not run.ended and not interrupted():
-            size = min(self._pace.size, expansions)
-            with self._pace.measured(size):
-                run.run(size)
-            expansions -= size
 
     def _count(self, improved: bool, is_first: bool) -> None:
         """Count the runs in a row that were in vain."""
@@ -171,16 +165,9 @@ class HybridAStarRuns:
                              arc_factors=factors, retry_penalty=retry_penalty, good_enough=GOOD_ENOUGH)
 
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
-        """Return a run with arcs of this length in turning radii, and headings in its closed set."""
-        problem, radius = self._problem, self._problem.vehicle.turning_radius
-        scale = problem.vehicle.maneuver_scale
-        turning_arc = min(arc * scale, max(arc, math.tau / headings) * radius)
-        corners = problem.map.corners()
-        return HybridAStar(
-            checker=self._checker, edge_cost=self._edge_cost, radius=radius, start=problem.start, goals=self._goals,
-            to_goal=self._to_goal.kernel, length_to_goal=self._length_to_goal.kernel,
-            corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * scale, turning_arc=turning_arc,
-            sectors=headings, weight=weight, visit_penalty=visit_penalty, **options)
+        return new_search(self._problem, self._checker, self._edge_cost, arc, headings, weight, visit_penalty,
+                          start=self._problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
+                          length_to_goal=self._length_to_goal.kernel, **options)
 
     def _measures(self, is_first: bool) -> tuple[float, int, float]:
         """Return the length of the next run's arcs in turning radii, its number of headings, its weight of the cost-to-go."""
@@ -191,6 +178,33 @@ class HybridAStarRuns:
             return NEXT_RUNS[self._started - 1]
         arc = self._rng.uniform(*LATER_ARCS)
         return arc, math.ceil(8 / arc), 1.0
+
+
+def new_search(problem: Problem, checker: CollisionChecker, edge_cost: EdgeCost, arc: float, headings: int, weight: float,
+               visit_penalty: float, **options: Any) -> HybridAStar:
+    """Return a search of hybrid A* on the problem's map.
+
+    Args:
+        checker, edge_cost: judge every arc, and say what it costs.
+        arc: length of the arcs in lengths of manoeuvres.
+        headings: number of headings in the closed set.
+        options: as of `HybridAStar`, between which poses above all.
+    """
+    radius, scale = problem.vehicle.turning_radius, problem.vehicle.maneuver_scale
+    turning_arc = min(arc * scale, max(arc, math.tau / headings) * radius)
+    corners = problem.map.corners()
+    return HybridAStar(
+        checker=checker, edge_cost=edge_cost, radius=radius, corner=corners.min(axis=0), extent=np.ptp(corners, axis=0),
+        arc=arc * scale, turning_arc=turning_arc, sectors=headings, weight=weight, visit_penalty=visit_penalty, **options)
+
+
+def expand(search: HybridAStar, pace: Pace, expansions: int, interrupted: Callable[[], bool]) -> None:
+    """Expand that many poses, in slices after each of which `interrupted` may end it."""
+    while expansions > 0 and not search.ended and not interrupted():
+        size = min(pace.size, expansions)
+        with pace.measured(size):
+            search.run(size)
+        expansions -= size
 
 
 def _goals(problem: Problem) -> np.ndarray:

@@ -18,6 +18,7 @@ What goes beyond the paper, and is left out where the settings say so, happens b
     informed   hybrid A* finds a first path, and others later     HybridAStarRuns.run
                only what can still be on a cheaper path is        RrtKernel.set_cost_bound
                drawn, and added; other nodes are forgotten        SearchTree.prune_index
+               other corridors are tried, one by one              Corridors.next_path
     shortcut   the best path is smoothed                          Smoother.smooth
     both       and added to the tree, which goes on from there    RrtKernel.insert_path
 
@@ -39,6 +40,7 @@ from ..curves.path import Path
 from ..deadline import Deadline, never
 from ..problem import Problem
 from ..settings import Settings
+from .corridors import Corridors
 from .cost import Objective
 from .cost_bounds import CostBounds
 from .cost_to_go import CostToGo
@@ -119,6 +121,8 @@ class Search:
             length_to_goal = to_goal if self.objective.is_length else CostToGo.to_goal(problem, field)
             self._runs = HybridAStarRuns(problem, settings, field, to_goal, length_to_goal)
             self._bounds = CostBounds(problem, field, to_goal, length_to_goal, self.objective)
+        self._corridors: Corridors | None = None
+        self._next_corridor = 0  # number of samples after which one is tried
         self._sampler = Sampler(problem, settings, field, to_goal)
         self._smoother = Smoother(self.objective, settings.seed, self._deadline.poll)
 
@@ -285,8 +289,12 @@ class Search:
                 yield from self._wait_for_runs()
                 self._end_block()
             rounds = self._rounds_due(had_path, used == BLOCK)
-            yield self._may_end(smoothing_is_due=bool(rounds))
+            corridor_is_due = self._is_corridor_due()
+            yield self._may_end(smoothing_is_due=bool(rounds) or corridor_is_due)
             yield from self._smooth(rounds)
+            if corridor_is_due:
+                self._try_corridor()
+                yield self._may_end()
             if self.best >= 0 and not self.ready:
                 self.ready = True
                 yield self._may_end()
@@ -307,6 +315,8 @@ class Search:
         """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
         left = self._settings.samples - self.samples
         end = min(begin + min(size, left if left > 0 else size, self._until_report()), BLOCK)
+        if self._corridors and not self._corridors.exhausted:
+            end = min(end, begin + self._next_corridor - self.samples)
         self._kernel.reserve(end - begin)
         started = time.perf_counter()
         # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
@@ -344,12 +354,25 @@ class Search:
         if from_start is None:
             from_start = self._bounds.make_from_start()  # first, as it was started last and may not be under way yet
             self.bound = self.make_bound()
+            if self._settings.shortcut and not self._is_rrt:
+                self._corridors = Corridors(self._problem, self.objective, from_start, self._bounds.to_goal, self.cost,
+                                            self._settings.seed, self._deadline.poll)
+                self._next_corridor = self.samples + self._corridors.interval
         self._kernel.set_cost_bound(self.cost, from_start.kernel, self._bounds.to_goal.kernel)
         wanted = self._bounds.nodes_to_keep(np.asarray(self._tree.poses)[:self.size, :2], self.cost)
         if wanted is not None:
             wanted[[0, self.best]] = True
             self._tree.prune_index(wanted.astype(np.int8))
         return True
+
+    def _is_corridor_due(self) -> bool:
+        return self._corridors is not None and not self._corridors.exhausted and self.samples >= self._next_corridor
+
+    def _try_corridor(self) -> None:
+        """Try one more corridor that may be shorter than the best path."""
+        if self._corridors and (path := self.path):
+            self._insert_if_better(self._corridors.next_path(path))
+            self._next_corridor = self.samples + self._corridors.interval
 
     def _rounds_due(self, had_path: bool, block_ended: bool) -> range:
         """Return the rounds of smoothing that are due: all for a first path, and the last after a block, if worthwhile."""
