@@ -9,14 +9,19 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("nav2_msgs", reason="nav2_msgs is not here; .ci/messages builds it")
 
+from geometry_msgs.msg import TransformStamped
 from nav2_msgs.action import ComputePathToPose
 from nav2_msgs_shapes.action import LaterToPose, OlderToPose
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from support.harness import poses_of, stamped, values_of
 from support.nav2_client import ABORTED, CANCELED, SUCCEEDED, PathClient
 from support.yard import BEHIND, ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, ON_THE_WAY_OUT, QUICK, START
+from tf2_msgs.msg import TFMessage
 
 pytestmark = pytest.mark.messages
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 NAME = "compute_path_to_pose"
 #: Of each error code the start, the goal, the parameters, and what the message says.
@@ -106,6 +111,23 @@ def test_without_use_start_it_is_planned_from_where_the_vehicle_is(action):
         return result.error_code == 0 and poses_of(result.path)[0].tolist() == pytest.approx(BEHIND)
 
     action.client.wait_for(from_there, "a path from the start of the topic")
+
+
+def test_without_use_start_it_is_planned_from_the_vehicle_s_frame_or_202(action):
+    client, frame = action.client, f"base_{action.client.node.get_namespace().strip('/')}"  # all nodes of a domain share /tf
+    client.set_parameters(robot_base_frame=frame, transform_tolerance=0.1)
+    try:
+        status, result = action.path(GOAL)
+        assert (status, result.error_code) == (ABORTED, 202)
+        assert frame in result.error_msg
+        publisher = client.node.create_publisher(TFMessage, "/tf_static", LATCHED)
+        transform = TransformStamped(header=Header(frame_id="map"), child_frame_id=frame)
+        transform.transform.translation.x, transform.transform.translation.y = BEHIND[:2]
+        publisher.publish(TFMessage(transforms=[transform]))
+        _, result = client.wait_for(lambda: (found := action.path(GOAL))[0] == SUCCEEDED and found, "a path from the frame")
+        assert poses_of(result.path)[0].tolist() == [*BEHIND[:2], 0.0]
+    finally:
+        client.set_parameters(robot_base_frame="")
 
 
 def test_states_that_nav2_has_no_code_for_are_200_and_named(module_planners, map_file, running):

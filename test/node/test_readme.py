@@ -13,6 +13,8 @@ README = (Path(__file__).resolve().parents[2] / "README.md").read_text("utf-8")
 #: What every node of rclpy has, and one that listens to transforms, by the last part of its name.
 OF_EVERY_NODE = {"parameter_events", "rosout", "clock", "tf", "tf_static", "describe_parameters", "get_parameter_types",
                  "get_parameters", "list_parameters", "set_parameters", "set_parameters_atomically", "get_type_description"}
+#: What it has besides where messages are installed that PyPI does not have, which docs/nav2.md and the prose tell of.
+OF_INSTALLATIONS = {"is_path_valid", "map_updates"}
 
 
 def table(*columns):
@@ -69,7 +71,7 @@ def names_of(node):
              "service": node.get_service_names_and_types_by_node}
     return {(direction, written(name, node.get_namespace()), re.sub("/(msg|srv)/", "/", kind))
             for direction, look in looks.items() for name, (kind,) in look("planner", node.get_namespace())
-            if name.rpartition("/")[2] not in OF_EVERY_NODE}
+            if name.rpartition("/")[2] not in OF_EVERY_NODE | OF_INSTALLATIONS and "/_action/" not in name}
 
 
 def written(name, namespace):
