@@ -191,10 +191,10 @@ export class View {
       this.line(path, COLOURS.swept, 2 * radius);
       return;
     }
-    const step = Math.max(1, Math.floor(path.length / 60));
-    this.context.lineWidth = this.pixel;
-    this.context.strokeStyle = "#d55e0066";
-    for (let i = 0; i < path.length; i += step) { this.outline(path[i]); this.context.stroke(); }
+    this.context.beginPath();
+    path.forEach((pose) => this.addOutline(pose));  // all turn the same way, so that together they fill their union
+    this.context.fillStyle = COLOURS.swept;
+    this.context.fill();
   }
 
   line(points, colour, width) {
@@ -208,12 +208,18 @@ export class View {
     context.stroke();
   }
 
-  outline([x, y, theta]) {
+  outline(pose) {
+    this.context.beginPath();
+    this.addOutline(pose);
+  }
+
+  addOutline([x, y, theta]) {
     const { context } = this, { footprint, radius } = this.vehicle;
-    context.beginPath();
     if (!footprint.length) { context.arc(x, y, radius, 0, 2 * Math.PI); return; }
     const cos = Math.cos(theta), sin = Math.sin(theta);
-    for (const [ahead, left] of footprint) { context.lineTo(x + ahead * cos - left * sin, y + ahead * sin + left * cos); }
+    footprint.forEach(([ahead, left], i) => {
+      context[i ? "lineTo" : "moveTo"](x + ahead * cos - left * sin, y + ahead * sin + left * cos);
+    });
     context.closePath();
   }
 

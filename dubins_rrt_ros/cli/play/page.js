@@ -139,7 +139,7 @@ function showFigures(answer) {
   $("title").textContent = answer.length === null ? `No path: ${answer.status}` : `Path of ${answer.length.toFixed(2)} m`;
   $("message").textContent = answer.length === null ? answer.message : "";
   const rows = [["no path is shorter than", metres(answer.lower_bound)], ["at most longer by", percent],
-                ["room to the walls", metres(answer.min_clearance)], ["first path", `${metres(answer.first_length)} after ${time(answer.time_to_first)}`],
+                ["room to the walls", metres(answer.min_clearance)], ["first path", answer.first_length ? `${metres(answer.first_length)} after ${time(answer.time_to_first)}` : time(answer.time_to_first)],
                 ["samples, tree nodes", `${answer.samples}, ${answer.tree_nodes}`], ["planned in", time(answer.planning_time)]];
   $("figures").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
 }
