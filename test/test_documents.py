@@ -25,7 +25,7 @@ import dubins_rrt_ros
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ["README.md", *sorted(f"docs/{page.name}" for page in ROOT.glob("docs/*.md"))]
-#: Marks of blocks that others run: .ci/run, and test/node/test_readme.py.
+#: Marks of blocks that others run: .ci/run, and test/node/test_reference.py.
 RUN_ELSEWHERE = ("quick start", "example client")
 #: How a block is run, by its language.
 INTERPRETERS = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}

@@ -1,4 +1,4 @@
-"""A table of all parameters in Markdown, which the README shows."""
+"""A table of all parameters in Markdown, which docs/reference.md shows."""
 
 import json
 import re

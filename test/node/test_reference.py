@@ -1,4 +1,4 @@
-"""What README.md says of the node: its client, as it stands there, and its tables."""
+"""What docs/reference.md says of the node: its client, as it stands there, and its tables."""
 
 import re
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 
 from dubins_rrt_ros.planning import Status
 
-README = (Path(__file__).resolve().parents[2] / "README.md").read_text("utf-8")
+REFERENCE = (Path(__file__).resolve().parents[2] / "docs/reference.md").read_text("utf-8")
 #: What every node of rclpy has, and one that listens to transforms, by the last part of its name.
 OF_EVERY_NODE = {"parameter_events", "rosout", "clock", "tf", "tf_static", "describe_parameters", "get_parameter_types",
                  "get_parameters", "list_parameters", "set_parameters", "set_parameters_atomically", "get_type_description"}
@@ -20,13 +20,13 @@ OF_INSTALLATIONS = {"is_path_valid", "map_updates"}
 def table(*columns):
     """The cells of each row of the table whose first columns have these headings."""
     head = re.escape(f"| {' | '.join(columns)} |")
-    found = re.search(rf"^{head}.*\n\|[-|: ]+\n((?:\|.*\n)+)", README, re.MULTILINE)
-    assert found, f"README.md has no table with the columns {', '.join(columns)}"
+    found = re.search(rf"^{head}.*\n\|[-|: ]+\n((?:\|.*\n)+)", REFERENCE, re.MULTILINE)
+    assert found, f"docs/reference.md has no table with the columns {', '.join(columns)}"
     return [[cell.strip() for cell in row.strip("|").split(" | ")] for row in found[1].splitlines()]
 
 
 def test_the_example_client_gets_its_path(planners):
-    block = re.search(r"<!-- example client -->\n```python\n(.*?)```", README, re.DOTALL)
+    block = re.search(r"<!-- example client -->\n```python\n(.*?)```", REFERENCE, re.DOTALL)
     process = planners.start(map_file="maze", seed=1)
     process.wait_until_ready()
     namespace = process.name.removesuffix("/planner")
@@ -39,7 +39,7 @@ def test_the_example_client_gets_its_path(planners):
 def test_the_table_of_parameters_is_the_one_that_is_printed(planners):
     process = planners.start("--", "--parameter-table")
     assert process.wait() == 0
-    written = re.findall("<!-- parameters -->\n(.*?)<!-- end of parameters -->", README, re.DOTALL)
+    written = re.findall("<!-- parameters -->\n(.*?)<!-- end of parameters -->", REFERENCE, re.DOTALL)
     remedy = "put what `planner --parameter-table` prints between <!-- parameters --> and <!-- end of parameters -->"
     assert [table.strip() for table in written] == [process.output.strip()], remedy
 
@@ -64,7 +64,7 @@ def test_the_table_of_topics_and_services_is_what_a_running_node_has(planners):
 
 
 def names_of(node):
-    """Direction, name and type of all that the planner in a client's namespace has, as the README writes them."""
+    """Direction, name and type of all that the planner in a client's namespace has, as the reference writes them."""
     if ("planner", node.get_namespace()) not in node.get_node_names_and_namespaces():
         return set()  # not yet
     looks = {"in": node.get_subscriber_names_and_types_by_node, "out": node.get_publisher_names_and_types_by_node,
