@@ -55,7 +55,7 @@ def _as_list(value: Any) -> Any:
 def _read_footprint_text(text: str) -> Footprint:
     if not text.strip():
         return ()
-    is_outline = _OUTLINE.fullmatch(text)
+    is_outline = text.count("[") <= MAX_CORNERS + 1 and _OUTLINE.fullmatch(text)
     return _checked_corners([list(map(float, corner)) for corner in _CORNER.findall(text)] if is_outline else None, text)
 
 

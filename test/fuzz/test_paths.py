@@ -1,4 +1,4 @@
-"""Whatever is in a file of poses or of a plan, `audit` has a verdict or a sentence. `test_maps.py` says how to run more of them."""
+"""Whatever is in a file of poses or of a plan, `audit` has a verdict or a sentence. `test_maps.py` says how to run more."""
 
 import contextlib
 import io
@@ -30,7 +30,8 @@ poses:
 - pose: {position: {x: 2.0, y: 2.5, z: 0.0}, orientation: {x: 0.0, y: 0.0, z: 0.70711, w: 0.70711}}
 ---
 """
-PICTURES = [("m.pgm", pgm([[0, 100, 205, 254]])), ("m.png", saved(row_of("RGB", (1, 2, 3)))), ("m.bmp", saved(row_of("L", 0, 254)))]
+PICTURES = [("m.pgm", pgm([[0, 100, 205, 254]])), ("m.png", saved(row_of("RGB", (1, 2, 3)))),
+            ("m.bmp", saved(row_of("L", 0, 254), "BMP"))]
 fuzz = settings.get_profile("fuzz")
 
 

@@ -160,6 +160,17 @@ def test_a_grey_that_is_none_is_refused(tmp_path, value):
         load_map(write_grid(tmp_path), unknown_grey=value)
 
 
+def test_a_drawing_without_a_background_is_doubted(tmp_path):
+    pixels = np.zeros((10, 10, 4), np.uint8)
+    pixels[:4, :, 3] = 255
+    Image.fromarray(pixels).save(tmp_path / "m.png")
+    warning, = load_map(tmp_path / "m.png", resolution=0.1).warnings
+    assert warning.startswith("60.00% of the pixels are transparent, and so unknown")
+    pixels[4, :, 3] = 255
+    Image.fromarray(pixels).save(tmp_path / "m.png")
+    assert load_map(tmp_path / "m.png", resolution=0.1).warnings == ()
+
+
 @pytest.mark.parametrize("mode, expected", [
     ("trinary", [100, -1, -1]), ("scale", [100, -1, 0]), ("raw", [0, 50, -1])])
 def test_transparency_is_unknown_but_in_raw(tmp_path, mode, expected):

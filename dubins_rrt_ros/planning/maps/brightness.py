@@ -11,6 +11,8 @@ from .model import DEFAULT_THRESHOLDS, FREE, OCCUPIED, UNKNOWN
 MODES = ("trinary", "scale", "raw")
 #: The brightness that trinary files have for free, occupied and unknown cells.
 FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205
+#: Share of transparent pixels beyond which these are doubtful: a drawing of walls alone, saved without its background.
+MOST_TRANSPARENT = 0.5
 
 
 class Rules(NamedTuple):
@@ -59,7 +61,7 @@ def cells_of(picture: Picture, rules: Rules, unknown_grey: int) -> tuple[np.ndar
     cells = values[picture.grey[::-1]]
     if picture.transparent is not None and rules.mode != "raw":
         cells[picture.transparent[::-1]] = UNKNOWN
-    return cells, (*_unknown_taken_as_free(picture, rules, cells), *_colours(picture, values))
+    return cells, (*_unknown_taken_as_free(picture, rules, cells), *_transparency(picture, rules), *_colours(picture, values))
 
 
 def _unknown_taken_as_free(picture: Picture, rules: Rules, cells: np.ndarray) -> Iterator[str]:
@@ -68,6 +70,13 @@ def _unknown_taken_as_free(picture: Picture, rules: Rules, cells: np.ndarray) ->
         yield (f"{share:.2%} of the cells have the grey {UNKNOWN_GREY}, as unknown space has it, and are free by free_thresh: "
                f"{rules.free_thresh:g}, as for map_server; if they are unknown, set free_thresh: {Rules().free_thresh:g}, or "
                f"take that grey as unknown, by unknown_grey = {UNKNOWN_GREY} (--unknown-grey {UNKNOWN_GREY})")
+
+
+def _transparency(picture: Picture, rules: Rules) -> Iterator[str]:
+    share = 0.0 if picture.transparent is None or rules.mode == "raw" else float(np.mean(picture.transparent))
+    if share > MOST_TRANSPARENT:
+        yield (f"{share:.2%} of the pixels are transparent, and so unknown, as for map_server; if they are free, save the image "
+               "without transparency, on white")
 
 
 def _colours(picture: Picture, values: np.ndarray) -> Iterator[str]:
