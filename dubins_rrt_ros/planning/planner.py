@@ -40,6 +40,8 @@ AUDIT_INTERVAL = 5
 AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
 #: Share of the time, and maximum time [s], that is kept to tell why there is no path.
 REASONS_SHARE, MOST_FOR_REASONS = 0.1, 0.1
+#: Number of steps of a search without a path after which a proof is sought that there is none.
+STEPS_TO_PROOF = 4
 #: A block of memory that is larger than any array of most requests [bytes].
 LARGE_BLOCK = 1 << 24
 
@@ -166,7 +168,9 @@ class _Call:
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
                         self._report_samples, self._usable_seed(field))
-        for may_end in () if deadline.is_due else search.run():
+        for step, may_end in enumerate(() if deadline.is_due else search.run()):
+            if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
+                return trapped
             if search.best >= 0 and self._time_to_found is None:
                 self._time_to_found = self._elapsed
                 deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
@@ -331,6 +335,8 @@ class _Call:
     def _failed(self, search: Search, field: ClearanceField) -> Plan:
         """Return the plan of a search that ended without a path."""
         search.wait()
+        if trapped := self._trapped(search, field):
+            return trapped
         tree, drawn = search.tree, self._drawn(search.samples, search.size)
         if search.done:
             what, more = "No path found", "samples"
@@ -345,6 +351,16 @@ class _Call:
         elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
             why, location = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
         return self._plan(Status.TIMEOUT, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location)
+
+    def _trapped(self, search: Search, field: ClearanceField) -> Plan | None:
+        """Return the plan without a path where no arc leaves the start or none reaches the goal, if that can be proved."""
+        try:
+            diagnosis = explain.trapped(self._problem, field, self._deadline.check)
+        except OutOfTime:
+            return None
+        if diagnosis is None:
+            return None
+        return self._plan(diagnosis.status, diagnosis.message, search.tree, samples=search.samples, location=diagnosis.location)
 
     def _drawn(self, samples: int, nodes: int) -> str:
         tree = f"{nodes} tree node{'' if nodes == 1 else 's'}"

@@ -17,6 +17,7 @@ from ..search.tree import Tree
 from ..text import at, distinct, metres, rounded_down, rounded_up
 from ..vehicle import Point, Vehicle
 from .components import are_separated, are_walled_off
+from .leaving import cannot_leave, room_to_turn
 from .nearest_pose import nearest_free_pose
 from .obstacles import (
     MAP_EDGE,
@@ -98,6 +99,31 @@ def _separated(problem: Problem, field: ClearanceField, check_time: Callable[[],
     return f"No path exists: {between}.", location
 
 
+def trapped(problem: Problem, field: ClearanceField, check_time: Callable[[], None] = unlimited) -> Diagnosis | None:
+    """Return that there is no path, where provably no arc leaves the start or none reaches the goal.
+
+    `check_time` is called every few milliseconds; what it raises ends the work.
+    """
+    x, y, theta = problem.goal
+    check = f"or check turning_radius ({problem.vehicle.turning_radius:g} m)."
+    if cannot_leave(problem, field, problem.start):
+        until, location = _until_hit(problem, field, problem.start, "within", check_time)
+        return Diagnosis(Status.NO_VALID_PATH, f"No path exists: every forward arc from the start hits an obstacle{until}; "
+                                               f"move or turn the start, {check}", location)
+    if problem.exact_goal and cannot_leave(problem, field, (x, y, theta + math.pi)):
+        until, location = _until_hit(problem, field, (x, y, theta + math.pi), "within the last", check_time)
+        return Diagnosis(Status.NO_VALID_PATH, "No path exists: no forward arc reaches the goal: every one that ends there comes "
+                                               f"through an obstacle{until}; move or turn the goal, {check}", location)
+    return None
+
+
+def _until_hit(problem: Problem, field: ClearanceField, pose: Pose, within: str, check_time: Callable[[], None]
+               ) -> tuple[str, Point | None]:
+    """Return how far the longest arc from a pose leads, in words, and where it ends."""
+    stuck = _all_arcs_hit(problem, field, pose, check_time)
+    return (f" {within} {rounded_up(stuck[0])} m, the longest at {at(stuck[1])}", stuck[1]) if stuck else ("", None)
+
+
 def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str, check_time: Callable[[], None]
                  ) -> tuple[str, Point | None]:
     """Return what kept a search from finding a path, as the end of a sentence, and the location that shows it.
@@ -129,7 +155,19 @@ def after_search(problem: Problem, field: ClearanceField, tree: Tree, more: str,
         return _unknown_between(problem, field, check_time) or _narrow_between(problem, field, passage, check_time)
     if len(tree) == 1:
         return f"no curve of the turning radius {radius:g} m left the start; set step_size, or allow more {more}", None
-    return _nearest_to_goal(problem, tree, more), None
+    return _no_room_to_turn(problem, field, passage, more) or (_nearest_to_goal(problem, tree, more), None)
+
+
+def _no_room_to_turn(problem: Problem, field: ClearanceField, passage: Passage, more: str) -> tuple[str, Point] | None:
+    """Return a clause that says that there most likely is too little room to turn round, if so, and where there is most."""
+    turn = room_to_turn(problem, field, passage.points)
+    if turn is None:
+        return None
+    (width, place), radius = turn, problem.vehicle.turning_radius
+    needed = 2 * (radius + problem.vehicle.inscribed_radius)
+    return (f"most likely there is no room to turn round: radius {radius:g} m needs {metres(needed)} m, the widest place that "
+            f"can be reached has {metres(width)} m, at {at(place)}; turn the start or the goal, check turning_radius, or "
+            f"allow more {more}"), place
 
 
 def _nearest_to_goal(problem: Problem, tree: Tree, more: str) -> str:

@@ -22,6 +22,8 @@ MAX_NODES = 1_000_000 if COMPILED else 50_000
 MAX_CELLS = 500_000
 #: Minimum number of points along a passage whose clearance is measured, and number of them that are measured at once.
 MEASURED, AT_ONCE = (20_000, 2_000) if COMPILED else (2_000, 50)
+#: Number of places across a passage of which the one with most clearance is taken; the middle one is a sample.
+PLACES = 9
 #: Number of nodes that are visited before the time is looked at.
 SLICE = 5_000 if COMPILED else 50
 
@@ -65,7 +67,7 @@ def widest_passage(problem: Problem, field: ClearanceField, check_time: Callable
     _, nodes = search.widest_path()
     if len(nodes) == 0:
         return None
-    points = grid.points(nodes)
+    points = _centred(grid.points(nodes), field, grid.spacing)
     to_goal = problem.goal[:2] - points[-1]
     left = math.hypot(*to_goal)
     end = points[-1] + to_goal * (max(0.0, left - problem.goal_tolerance_xy) / left if left > 0 else 0.0)
@@ -122,6 +124,16 @@ class _SampleGrid:
         around[around] = self._field.at(self.points(nodes[around])) > left[around]
         found: np.ndarray = nodes[around | (left <= 0)]
         return found
+
+
+def _centred(points: np.ndarray, field: ClearanceField, spacing: float) -> np.ndarray:
+    """Return points of a passage, each moved across it by up to `spacing` to where the clearance is greatest."""
+    along = points[np.minimum(np.arange(len(points)) + 3, len(points) - 1)] - points[np.maximum(np.arange(len(points)) - 3, 0)]
+    length = np.hypot(*along.T)
+    across = np.column_stack([-along[:, 1], along[:, 0]]) / np.where(length > 0, length, 1.0)[:, None]
+    places = points + spacing * np.linspace(-1, 1, PLACES)[:, None, None] * across
+    clearance = field.at(places)
+    return np.asarray(places[np.argmax(clearance, axis=0), np.arange(len(points))])
 
 
 def _measured(corners: np.ndarray, field: ClearanceField, check_time: Callable[[], None]) -> Passage:

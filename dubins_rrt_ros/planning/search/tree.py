@@ -19,6 +19,9 @@ from .cost import lengths_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: Maximum error of the end of an edge, in metres for each metre and in radians, and of a coordinate, relatively.
+TOLERANCE, ROUNDING = 1e-9, 4e-15
+
 
 class TreeError(PlanningError, AssertionError):
     """A tree that breaks one of its invariants; the message says which and where."""
@@ -150,7 +153,9 @@ class Tree(Plottable):
     def _check_edge(self, node: int, field: ClearanceField | None, vehicle: Vehicle | None) -> None:
         curve = self.curve_to(node)
         end, pose = curve.end, tuple(self.poses[node].tolist())
-        if not (position_error(end, pose) <= 1e-9 * (1 + curve.length) and heading_error(end, pose) <= 1e-9):
+        rounding = ROUNDING * max(map(abs, (*curve.start[:2], *pose[:2])))
+        if not (position_error(end, pose) <= TOLERANCE * (1 + curve.length) + rounding
+                and heading_error(end, pose) <= TOLERANCE + rounding / self.radius):
             raise TreeError(f"the edge to node {node} ends at {end}, not at {pose}")
         if field and vehicle and not field.curve_is_free(curve, vehicle):
             raise TreeError(f"the edge to node {node} is not free for {vehicle}")
