@@ -62,7 +62,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--degrees", action="store_true", default=argparse.SUPPRESS,
                         help="take the yaws of --start, --via and --goal in degrees; what is written stays in radians")
     add_json_flag(parser, "the plan, also without a path,")
-    parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x,y,theta")
+    parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x, y, theta, clearance, curvature")
     parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
                                                          f"search ({', '.join(ANIMATIONS)})")
     parser.add_argument("--replay", metavar="FILE", action=_Replay, contained=required,

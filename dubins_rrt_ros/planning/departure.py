@@ -90,7 +90,10 @@ class Departure(NamedTuple):
 
         assert self.path is not None
         length = None if report.length is None else report.length + self.path.length
-        return replace(report, length=length, snapshot=snapshot, tree=lambda: snapshot().tree)
+        cost = report.cost
+        if cost is not None:
+            cost += Objective.of(problem, report.snapshot().settings, field).path_cost(self.path)
+        return replace(report, length=length, cost=cost, snapshot=snapshot, tree=lambda: snapshot().tree)
 
 
 def find_departure(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:

@@ -214,8 +214,8 @@ class _Call:
         self._last_report = self._elapsed
         if self._report_samples:
             self._samples_reported = samples - samples % self._report_samples
-        length = self._best.path.length if self._best else None
-        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot, tree))
+        length, cost = (self._best.path.length, self._best.cost) if self._best else (None, None)
+        self._on_progress(Progress(samples, self._last_report, length, improved, snapshot, tree, cost))
 
     def _is_audit_due(self, search: Search) -> bool:
         """Return True if the best path is better than the one that was audited last, and the last audit is long enough ago."""
@@ -297,7 +297,7 @@ class _Call:
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and self._best.improves(before):
             self._on_progress(Progress(answer.samples, answer.planning_time, answer.length, True, lambda: answer,
-                                       lambda: answer.tree))
+                                       lambda: answer.tree, answer.cost))
         return answer
 
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:

@@ -267,7 +267,7 @@ class Progress:
     Attributes:
         samples: number of samples drawn so far.
         elapsed: time since the request [s].
-        length: length of the best path so far that is shortened and audited [m], or None.
+        length, cost: length and cost of the best path so far that is shortened and audited [m], or None.
         improved: True if this report was made because that path is new.
         snapshot: a function that returns the Plan so far: with that path, and the tree of the moment when it was audited; call it
             only before the callback returns.
@@ -280,3 +280,4 @@ class Progress:
     improved: bool
     snapshot: Callable[[], Plan]
     tree: Callable[[], Tree]
+    cost: float | None = None

@@ -118,7 +118,8 @@ class _Call:
         paths = self._turned(stops, [leg.path(i, j) for leg, (i, j) in zip(legs, pairwise(headings), strict=True)])
         first = self._joined(stops, paths)
         if self._on_progress and first.path:
-            self._on_progress(Progress(first.samples, first.planning_time, first.length, True, lambda: first, lambda: first.tree))
+            self._on_progress(Progress(first.samples, first.planning_time, first.length, True, lambda: first, lambda: first.tree,
+                                       first.cost))
         if self._settings.planner == "rrt" or self._clock.is_over:
             return first
         return self._joined(stops, self._turned(stops, self._planned(paths)))

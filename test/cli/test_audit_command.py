@@ -176,10 +176,11 @@ def test_poses_are_judged_with_the_vehicle_of_the_flags(wrapped, capsys):
 
 def test_poses_in_csv_are_judged(document, capsys):
     """As `plan --csv` writes them."""
-    rows = "".join(f"{x!r},{y!r},{theta!r}\n" for x, y, theta in document["poses"])
-    Path("path.csv").write_text(f"x,y,theta\n{rows}")
-    status, out, _ = run("path.csv", "hall.wkt", *DISC, capsys=capsys)
-    assert status == 0 and f"length {document['length']:.3f} m" in out
+    for more, values in ("", ""), (",clearance,curvature", ",0.5,-1.0"):
+        rows = "".join(f"{x!r},{y!r},{theta!r}{values}\n" for x, y, theta in document["poses"])
+        Path("path.csv").write_text(f"x,y,theta{more}\n{rows}")
+        status, out, _ = run("path.csv", "hall.wkt", *DISC, capsys=capsys)
+        assert status == 0 and f"length {document['length']:.3f} m" in out
     Path("path.csv").write_text("x,y,theta\n1,2,three\n")
     assert "path.csv is no JSON file" in refusal("path.csv", "hall.wkt", *DISC, capsys=capsys)
 

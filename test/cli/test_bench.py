@@ -82,6 +82,7 @@ def test_a_line_tells_what_plan_does(capsys):
         times, costs = zip(*line["trace"], strict=True)
         assert 0 < line["time_to_found"] <= line["time_to_first"]
         assert [line["time_to_first"], line["first_cost"]] == line["trace"][0] and costs[-1] == line["final_cost"]
+        assert [line["first_objective"], line["final_objective"]] == [line["first_cost"], line["final_cost"]]
         assert (np.diff(costs) < 0).all() and (np.diff((0, *times, line["total_s"])) >= 0).all()
     said, errors = capsys.readouterr()
     assert errors == "" and said.count("\n") == 2 and said.startswith("hall: 2/2 solved, first path ")

@@ -15,7 +15,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.planning import PolygonMap, Settings, rasterise, save_map
+from dubins_rrt_ros.planning import ClearanceField, PolygonMap, Settings, rasterise, save_map
 
 HALL = shapely.box(-6, -5, 6, 5).difference(shapely.box(-1, -5, 0, 1))
 REQUEST = ["--start", "-4", "-3", "1.5707963267948966", "--goal", "3.5", "-3", "-1.5707963267948966"]
@@ -148,8 +148,11 @@ def test_csv_and_json_hold_the_same_poses_from_start_to_goal(hall, capsys):
     files = ["--json", "p.json", "--csv", "p.csv", "--path-spacing", "0.2"]
     assert run(hall, *REQUEST, *BUDGET, *files, capsys=capsys)[0] == 0
     header, *rows = Path("p.csv").read_text().splitlines()
-    poses = np.array([list(map(float, row.split(","))) for row in rows])
-    assert header == "x,y,theta"
+    table = np.array([list(map(float, row.split(","))) for row in rows])
+    poses, clearance, curvature = table[:, :3], table[:, 3], table[:, 4]
+    assert header == "x,y,theta,clearance,curvature"
+    np.testing.assert_allclose(clearance, ClearanceField(PolygonMap(HALL)).at(poses[:, :2]), atol=1e-9)
+    assert set(np.round(curvature, 6)) <= {-1.0, 0.0, 1.0} and len(set(np.round(curvature, 6))) > 1
     assert poses.tolist() == json.loads(Path("p.json").read_text())["poses"]
     assert poses[[0, -1]].tolist() == [[-4.0, -3.0, 1.5707963267948966], [3.5, -3.0, -1.5707963267948966]]
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.2
@@ -168,7 +171,7 @@ def test_no_path_gives_the_reason_in_one_line_and_the_files(hall, capsys):
     status, out, error = run(hall, "--start", "-0.5", "-2", "0", *REQUEST[4:], *files, capsys=capsys)
     assert status == 1 and out == "" and error.startswith("205 START_OCCUPIED: ") and error.count("\n") == 1
     assert json.loads(Path("p.json").read_text())["error_name"] == "START_OCCUPIED"
-    assert Path("p.csv").read_text() == "x,y,theta\n" and "START_OCCUPIED" in Path("p.svg").read_text()
+    assert Path("p.csv").read_text() == "x,y,theta,clearance,curvature\n" and "START_OCCUPIED" in Path("p.svg").read_text()
 
 
 @pytest.mark.parametrize("number", ["-1e-3", "-.5", "-4"])

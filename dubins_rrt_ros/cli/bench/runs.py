@@ -72,15 +72,18 @@ def measure(run: BenchRun) -> dict[str, Any]:
     world, map_time = _loaded(case.map, case.vehicle, case.allow_unknown)
     problem = Problem(world, start=case.start, goal=case.goal, **dict(case.request))
     trace: list[list[float]] = []
+    objectives: list[float | None] = []
 
     def record(progress: Progress) -> None:
         if progress.improved and progress.length is not None:
             trace.append([progress.elapsed, progress.length])
+            objectives.append(progress.cost)
 
     answer = plan(problem, run.settings, on_progress=record)
     if answer.length is not None and not (trace and trace[-1][1] <= answer.length):
         trace.append([answer.planning_time, answer.length])
-    return _line(run, answer, trace, map_time)
+        objectives.append(answer.cost)
+    return _line(run, answer, trace, objectives[0] if objectives else None, map_time)
 
 
 @lru_cache(maxsize=1)
@@ -91,13 +94,15 @@ def _loaded(file: Path, vehicle: Vehicle, allow_unknown: bool) -> tuple[World, f
     return world, time.perf_counter() - begin
 
 
-def _line(run: BenchRun, answer: Plan, trace: list[list[float]], map_time: float) -> dict[str, Any]:
+def _line(run: BenchRun, answer: Plan, trace: list[list[float]], first_objective: float | None, map_time: float
+          ) -> dict[str, Any]:
     solved = answer.path is not None
     first_time, first_cost = trace[0] if solved else (None, None)
     return {
         "problem": run.case.name, "planner": run.label, "seed": run.settings.seed, "time_limit": run.settings.planning_time,
         "solved": solved, "error_name": answer.status.name, "message": answer.message, "found_by": answer.found_by,
         "time_to_found": answer.time_to_found, "time_to_first": first_time, "first_cost": first_cost, "final_cost": answer.length,
+        "first_objective": first_objective, "final_objective": answer.cost,
         "total_s": answer.planning_time, "samples": int(answer.samples), "vertices": len(answer.tree),
         "map_ms": 1000 * map_time, "trace": trace,
         "path": answer.path.poses(_spacing(answer.problem.map)).tolist() if answer.path else [], "audit": str(answer.audit or ""),

@@ -46,10 +46,10 @@ def read_poses_or_json(file: str) -> Any:
 
 def _csv_poses(text: str) -> list[list[float]]:
     header, *rows = [tuple(word.strip() for word in line.split(",")) for line in text.split("\n") if line.strip()] or [()]
-    if header != CSV_HEADER:
+    if header[:3] != CSV_HEADER:
         return []
     try:
-        return [[float(number) for number in row] for row in rows]
+        return [[float(number) for number in row[:3]] for row in rows]
     except ValueError:
         return []
 

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any, TextIO
 
-from dubins_rrt_ros.planning import Plan
+import numpy as np
+
+from dubins_rrt_ros.planning import ClearanceField, Plan
 from dubins_rrt_ros.planning.pictures import ANIMATIONS, VIDEO
 from dubins_rrt_ros.planning.plan_file import to_document
 
@@ -15,6 +17,8 @@ from .extras import require_ffmpeg, require_matplotlib
 from .parser import UsageError
 
 STDOUT = "-"
+#: Header of the CSV of a path.
+CSV_COLUMNS = ("x", "y", "theta", "clearance", "curvature")
 DRAWINGS = (".png", ".svg", ".pdf")
 
 
@@ -80,7 +84,29 @@ def write_document(file: str, document: dict[str, Any]) -> None:
 
 
 def write_csv(file: str, plan: Plan) -> None:
-    """Write the poses of the path at the spacing of the settings: a header x,y,theta and a row each."""
-    poses = plan.poses().tolist()
+    """Write the poses of the path at the spacing of the settings: a header, and a row each.
+
+    The clearance is that of a disc's middle or of the footprint [m], the curvature that of what is driven next, positive to the
+    left [1/m].
+    """
+    poses = plan.poses()
+    rows = np.column_stack([poses, _clearances(plan, poses), _curvatures(poses)]).tolist() if len(poses) else []
     with Path(file).open("w", newline="", encoding="utf-8") as out:
-        csv.writer(out, lineterminator="\n").writerows([["x", "y", "theta"], *poses])
+        csv.writer(out, lineterminator="\n").writerows([CSV_COLUMNS, *rows])
+
+
+def _clearances(plan: Plan, poses: np.ndarray) -> np.ndarray:
+    """Return the (n,) clearances at the poses of a plan [m]."""
+    problem = plan.problem
+    return ClearanceField(problem.map, problem.allow_unknown).clearances(poses, problem.vehicle)
+
+
+def _curvatures(poses: np.ndarray) -> np.ndarray:
+    """Return the (n,) curvatures of the arcs between (n, 3) poses, and of the last one again [1/m]."""
+    if len(poses) < 2:
+        return np.zeros(len(poses))
+    x, y, turn = np.diff(poses, axis=0).T
+    half = np.remainder(turn + math.pi, math.tau) / 2 - math.pi / 2
+    chord = np.hypot(x, y)
+    curvature = np.divide(2 * np.sin(half), chord, out=np.zeros(len(chord)), where=chord > 0)
+    return np.append(curvature, curvature[-1])

@@ -136,6 +136,14 @@ class ClearanceField:
             points = self.frame.from_map(shapely.get_coordinates(self._polygons))
         return CornerIndex(points, self.kernel.width, self.kernel.height, BUCKET * self.kernel.resolution)
 
+    def clearances(self, poses: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+        """Return (n,) distances to the nearest obstacle at (n, 3) free poses [m]: from a disc's middle, or from a footprint."""
+        if not vehicle.footprint:
+            return self.at(poses[:, :2])
+        out = np.empty(len(poses))
+        self.room(vehicle).rooms(np.require(poses, float, ["C", "W"]), self.kernel.width + self.kernel.height, out)
+        return out
+
     def pose_is_free(self, pose: Pose, vehicle: Vehicle) -> bool:
         """Return whether the vehicle touches no obstacle at a pose and keeps a margin of less than a millimetre."""
         return self._is_outside_obstacles(pose, vehicle) and self.collision_checker(vehicle).is_pose_free(pose)
