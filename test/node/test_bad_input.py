@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
@@ -143,8 +144,9 @@ def test_a_goal_without_a_rotation_is_taken_where_any_heading_will_do(talk):
     talk.client.set_parameters(any_goal_heading=True)
     try:
         talk.start(START)
-        assert talk.goal(turned())["error_name"] == "NONE"
-        assert talk.plan(START, turned())[0]["error_name"] == "NONE"
+        for told in (talk.goal(turned()), talk.plan(START, turned())[0]):
+            assert (told["error_name"], told["level"]) == ("NONE", DiagnosticStatus.OK), told["message"]
+            assert "rad from the goal" not in told["message"]
         assert_says(talk.plan(turned(), GOAL)[0], "212", "INVALID_POSE", "no rotation")
     finally:
         talk.client.set_parameters(any_goal_heading=False)

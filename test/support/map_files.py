@@ -35,6 +35,6 @@ def refusal(path, kind=MapError, **options):
     assert type(caught.value) is kind
     message = str(caught.value)
     assert message.isprintable()
-    assert message.startswith(f"{path}: ")
+    assert message.startswith(f"{path}: ") and message.count(str(path)) == 1
     assert any(word in message.split("; ")[-1] for word in REMEDIES), message
     return message
