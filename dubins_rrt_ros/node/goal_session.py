@@ -1,7 +1,7 @@
 """The goal that came by topic, alone or after waypoints, which stands until it is reached, cancelled or replaced."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 from functools import partial
 
@@ -196,6 +196,8 @@ class GoalSession:
             any_heading = self._dispatcher.any_goal_heading or (len(goal) > 1 and not has_rotation(goal[-1].pose))
             locate = partial(self._locate, goal[self._passed:], any_heading)
             planned = self._dispatcher.request(self._readiness.require_map(), locate, any_goal_heading=any_heading)
+            if purpose is _Purpose.REPLAN and self._progress is not None:
+                planned = replace(planned, seed_path=self._progress.ahead)
             if purpose is _Purpose.GOAL and not planned.world.done():
                 self._node.get_logger().info("The goal waits until the map is prepared, which takes seconds where it is large")
             improve = None if self._parameters.read().node.publish == "final" else partial(self._improve, request)

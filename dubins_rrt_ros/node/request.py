@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-from dubins_rrt_ros.planning import Plan, Problem, Progress, Settings, Status, World, plan, plan_through
+from dubins_rrt_ros.planning import Path, Plan, Problem, Progress, Settings, Status, World, plan, plan_through
 from dubins_rrt_ros.planning.problem import Pose, Waypoint
 from dubins_rrt_ros.planning.text import one_line
 
@@ -82,6 +82,7 @@ class PlanRequest:
         settings: how to plan.
         world: the problem's map, once it is prepared.
         check_invariants: True if every answer is checked, improvements too.
+        seed_path: what the search begins with, as `plan` takes it; not used where there are waypoints.
     """
 
     locate: Callable[[], Route]
@@ -89,6 +90,7 @@ class PlanRequest:
     settings: Settings
     world: Future[World]
     check_invariants: bool = False
+    seed_path: Path | None = None
 
     def serve(self, improved: Callable[[Plan], None] | None, cancelled: Callable[[], bool]) -> Plan:
         """Plan, and return the answer.
@@ -114,7 +116,10 @@ class PlanRequest:
                 if snapshot.path is not None:
                     improved(self._checked(snapshot))
 
-        search = partial(plan_through, problem, route.waypoints) if route.waypoints else partial(plan, problem)
+        if route.waypoints:
+            search = partial(plan_through, problem, route.waypoints)
+        else:
+            search = partial(plan, problem, seed_path=self.seed_path)
         return self._checked(search(self.settings, cancel=cancelled, on_progress=on_progress))
 
     def _checked(self, answer: Plan) -> Plan:

@@ -128,7 +128,7 @@ def test_an_answer_is_checked_where_that_is_wanted(request_for, monkeypatch):
 
 def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, monkeypatch):
     """And what it would have answered is not reported."""
-    def report_broken(problem, settings, *, cancel, on_progress):
+    def report_broken(problem, settings, *, cancel, on_progress, seed_path):
         answer = plan(problem, settings)
         on_progress(Progress(1, 0.0, answer.length, True, lambda: replace(answer, audit=None), lambda: answer.tree))
         return answer
@@ -137,6 +137,13 @@ def test_an_improvement_that_breaks_an_invariant_ends_the_request(request_for, m
     request = replace(request_for(samples=10, planning_time=60.0, seed=1), check_invariants=True)
     with pytest.raises(PlanError, match="its audit is None"):
         request.serve(pytest.fail, never)
+
+
+def test_the_search_begins_with_the_seed_path(request_for):
+    first = request_for(samples=100, planning_time=60.0, seed=1).serve(None, never)
+    request = replace(request_for(planner="rrt", planning_time=60.0, seed=2), seed_path=first.path)
+    answer = request.serve(None, never)
+    assert answer.found_by == "seed_path" and answer.length <= first.length
 
 
 def test_improvements_are_not_reported_before_the_interval_is_over(request_for, clock):
