@@ -54,6 +54,8 @@ MOST_EXPANDED = 200_000
 FIRST_SLICE, LARGEST_SLICE = 16, 1024
 #: Number of headings that are tried at a goal where several will do.
 HEADINGS_AT_GOAL = 16
+#: Numbers of distances and of directions from a goal that is not free in which a free pose is sought within its tolerance.
+DISTANCES_AT_GOAL, BEARINGS_AT_GOAL = 33, 24
 
 
 class HybridAStarRuns:
@@ -75,7 +77,7 @@ class HybridAStarRuns:
         self._edge_cost = self._objective.edge_cost()
         self._checker = field.collision_checker(problem.vehicle)
         self._settings = settings
-        self._goals = _goals(problem)
+        self._goals = goal_poses(problem, self._checker)
         self._current: HybridAStar | None = None
         self._in_background: BackgroundJob[Path | None] | None = None
         self._pace = Pace(FIRST_SLICE, LARGEST_SLICE)
@@ -207,11 +209,34 @@ def expand(search: HybridAStar, pace: Pace, expansions: int, interrupted: Callab
         expansions -= size
 
 
-def _goals(problem: Problem) -> np.ndarray:
-    """Return (m, 3) poses that reach the goal: itself, and others at its position where its heading has a tolerance."""
-    if problem.yaw_tolerance == 0:
-        return np.array([problem.goal])
-    turns = problem.yaw_tolerance * np.linspace(-1, 1, HEADINGS_AT_GOAL + 1)[1:]
-    goals = np.tile(problem.goal, (len(turns) + 1, 1))
-    goals[1:, 2] = wrap(goals[1:, 2] + turns)
-    return goals
+def goal_poses(problem: Problem, checker: CollisionChecker) -> np.ndarray:
+    """Return (m, 3) poses that reach the goal: at its position, or next to it where that has a tolerance and is not free.
+
+    They have the goal's heading, and others where that has a tolerance.
+    """
+    goals = _turned(np.array([problem.goal]), problem.yaw_tolerance)
+    if problem.goal_tolerance_xy == 0 or any(map(checker.is_pose_free, goals.tolist())):
+        return goals
+    nearest = _nearest_free(problem, checker)
+    return goals if nearest is None else _turned(nearest, problem.yaw_tolerance)
+
+
+def _turned(poses: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return (m, 3) poses: those given, and the same with other headings up to a tolerance [rad]."""
+    if tolerance == 0:
+        return poses
+    turns = tolerance * np.linspace(-1, 1, HEADINGS_AT_GOAL + 1)[1:]
+    turned = np.repeat(poses, len(turns), axis=0)
+    turned[:, 2] = wrap(turned[:, 2] + np.tile(turns, len(poses)))
+    return np.concatenate([poses, turned])
+
+
+def _nearest_free(problem: Problem, checker: CollisionChecker) -> np.ndarray | None:
+    """Return the (1, 3) free pose nearest to the goal, of those tried, with the goal's heading; None where none is free."""
+    bearings = np.linspace(0, math.tau, BEARINGS_AT_GOAL, endpoint=False)
+    for distance in problem.goal_tolerance_xy * np.linspace(0, 1, DISTANCES_AT_GOAL, endpoint=False)[1:]:
+        steps = distance * np.column_stack([np.cos(bearings), np.sin(bearings), 0 * bearings])
+        for pose in problem.goal + steps:
+            if checker.is_pose_free(pose):
+                return np.array([pose])
+    return None
