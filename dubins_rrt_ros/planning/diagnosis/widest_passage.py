@@ -67,11 +67,13 @@ def widest_passage(problem: Problem, field: ClearanceField, check_time: Callable
     _, nodes = search.widest_path()
     if len(nodes) == 0:
         return None
-    points = _centred(grid.points(nodes), field, grid.spacing)
+    points = grid.points(nodes)
     to_goal = problem.goal[:2] - points[-1]
     left = math.hypot(*to_goal)
     end = points[-1] + to_goal * (max(0.0, left - problem.goal_tolerance_xy) / left if left > 0 else 0.0)
-    return _measured(np.vstack([problem.start[:2], points, end]), field, check_time)
+    found, centred = (_measured(np.vstack([problem.start[:2], way, end]), field, check_time)
+                      for way in (points, _centred(points, field, grid.spacing)))
+    return centred if found.radius < min(centred.radius, problem.vehicle.required_clearance) else found
 
 
 def widest_passage_through_unknown(problem: Problem, check_time: Callable[[], None] = unlimited) -> Passage | None:
