@@ -15,7 +15,8 @@ from dubins_rrt_ros.planning.text import LONGEST
 
 FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "cost",
            "cost_lower_bound", "cost_gap", "min_clearance", "max_curvature")
-FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES, "audit",
+FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES,
+          "path_length", "audit",
           "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}
 
 
@@ -41,6 +42,7 @@ def test_the_document_has_the_promised_fields(answer):
     document = through_json(answer)
     assert set(document) == FIELDS
     assert document["error_code"] == 0 and document["error_name"] == "NONE" and document["audit"] == "ok"
+    assert document["path_length"] == document["length"] == answer.length
     assert document["map"] == "hall.wkt" and document["map_id"] == answer.problem.map.id
     assert document["settings"] == values(answer.problem) | values(answer.settings)
     assert document["tree_nodes"] > 1 and document["samples"] == answer.samples and document["seed"] == 4

@@ -270,7 +270,7 @@ def test_a_long_and_thin_polygon_map_is_published_with_no_more_cells(size):
 
 
 KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
-        "path_length",
+        "path_length", "length",
         "lower_bound", "gap", "cost", "cost_lower_bound", "cost_gap", "time_to_first", "time_to_found", "planning_time",
         "min_clearance", "max_curvature", "audit",
         "seed", "map_id", "stamp"]
@@ -291,7 +291,8 @@ def test_the_status_of_a_path_has_all_its_figures(over_the_wire, plans):
     assert (told["planner"], told["audit"], told["seed"]) == ("rrt_star", "ok", "1")
     assert told["map_id"] == plan.problem.map.id
     assert (int(told["samples"]), int(told["tree_nodes"])) == (plan.samples, len(plan.tree.poses))
-    for key, figure in {"path_length": plan.length, "lower_bound": plan.lower_bound, "gap": plan.gap, "cost": plan.cost,
+    for key, figure in {"path_length": plan.length, "length": plan.length, "lower_bound": plan.lower_bound, "gap": plan.gap,
+                        "cost": plan.cost,
                         "cost_lower_bound": plan.cost_lower_bound, "cost_gap": plan.cost_gap,
                         "time_to_first": plan.time_to_first, "time_to_found": plan.time_to_found,
                         "planning_time": plan.planning_time,
