@@ -140,6 +140,17 @@ def test_walls_prove_nothing_of_a_hitch_but_of_the_trailer():
     assert "the footprint touches an obstacle" in plan(touching, Settings(samples=5, seed=1)).message
 
 
+@needs_compiled
+def test_nothing_is_proved_of_a_hitch_beside_the_edge_of_the_map():
+    """A disc at the hitch cannot turn away from the edge that it faces."""
+    ends = (7.9, 4.0, 0.0), (2.0, 6.0, 0.0)
+    disc, trailer = (Problem(PolygonMap(shapely.box(0, 0, 8, 8)), vehicle, *ends)
+                     for vehicle in (Vehicle(0.8, 0.05), Vehicle(0.8, footprint=BY_ITS_HITCH)))
+    short = Settings(samples=5, seed=1, planning_time=0.3)
+    assert plan(disc, short).status == Status.NO_VALID_PATH
+    assert plan(trailer, short).status in (Status.NONE, Status.TIMEOUT)
+
+
 @pytest.mark.parametrize("options", [{"informed": False}, {"shortcut": False}, {"step_size": 1.0},
                                      {"informed": False, "step_size": 1.0}])
 def test_the_other_ways_to_search_know_the_footprint_too(options):

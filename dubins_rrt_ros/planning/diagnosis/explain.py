@@ -104,6 +104,8 @@ def trapped(problem: Problem, field: ClearanceField, check_time: Callable[[], No
 
     `check_time` is called every few milliseconds; what it raises ends the work.
     """
+    if problem.vehicle.required_clearance < 0:
+        return None  # its reference point may leave even the map
     x, y, theta = problem.goal
     check = f"or check turning_radius ({problem.vehicle.turning_radius:g} m)."
     if cannot_leave(problem, field, problem.start):
