@@ -28,7 +28,8 @@ from .smoothing import smooth
 #: FIRST_VISIT_PENALTY.
 FIRST_RUNS = ((0.5, 16), (0.3, 24), (0.15, 32))
 FIRST_WEIGHT, FIRST_VISIT_PENALTY = 2.0, 0.5
-#: Cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends such a run.
+#: Cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends a run that weighs the
+#: cost-to-go by more than 1.
 GOOD_ENOUGH = 1.5
 #: Runs for narrow places, which follow by turns as long as there is no path: in a tunnel that leaves millimetres turns must begin
 #: just where they have to, so arcs have random lengths, and a pose is expanded again and again. Length of the arcs in turning
@@ -156,7 +157,7 @@ class HybridAStarRuns:
         arc, headings, weight = self._measures(is_first)
         return self._new_run(arc, headings, weight, FIRST_VISIT_PENALTY if is_first else 0.0,
                              limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED,
-                             good_enough=GOOD_ENOUGH if is_first else 0.0)
+                             good_enough=GOOD_ENOUGH if weight > 1 else 0.0)
 
     def _narrow_run(self, number: int) -> HybridAStar:
         """Return the run of this number for narrow places."""
