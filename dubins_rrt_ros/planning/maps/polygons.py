@@ -11,7 +11,7 @@ import shapely
 
 from ..text import quoted
 from .errors import MapError
-from .free_space import MAX_COORDINATE, free_space, valid
+from .free_space import MAX_COORDINATE, check_size, free_space, valid
 from .model import PolygonMap
 
 #: Size of a map below which its coordinates may be degrees, and how many times further from (0, 0) it is then, at least.
@@ -136,8 +136,14 @@ def _geometry(feature: Any, label: str) -> shapely.Geometry:
 def _polygon(rings: Any, label: str) -> shapely.Polygon:
     if not isinstance(rings, list) or not rings:
         raise MapError(f"{label}: coordinates is {quoted(rings)}; give a list of rings")
-    shell, *holes = (_ring(ring, f"{label}, ring {i}") for i, ring in enumerate(rings, 1))
-    return valid(shapely.Polygon(shell, holes), label)
+    named = {f"{label}, ring {i}": ring for i, ring in enumerate(rings, 1)}
+    shell, *holes = made = [_ring(ring, name) for name, ring in named.items()]
+    polygon = shapely.Polygon(shell, holes)
+    if not shapely.is_valid(polygon):  # which looks at the rings too, and may take seconds for each
+        for name, ring in zip(named, made, strict=True):
+            valid(ring, name)
+        valid(polygon, label)
+    return polygon
 
 
 def _ring(ring: Any, label: str) -> shapely.LinearRing:
@@ -148,7 +154,9 @@ def _ring(ring: Any, label: str) -> shapely.LinearRing:
     if positions[0] != positions[-1]:
         ends = f"{positions[0]} to {positions[-1]}"
         raise MapError(f"{label} is not closed ({ends}); repeat its first position as the last")
-    return valid(shapely.LinearRing(positions), label)
+    made = shapely.LinearRing(positions)
+    check_size(made, label)
+    return made
 
 
 def _positions(ring: list[Any], label: str) -> Iterator[tuple[float, float]]:
