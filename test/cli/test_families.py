@@ -6,8 +6,10 @@ import pytest
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.evaluation.families import ways
+from dubins_rrt_ros.evaluation.families.buildings import BUILDINGS, building
 from dubins_rrt_ros.evaluation.families.problems import FAMILIES, constructed
-from dubins_rrt_ros.planning import Path, audit_path
+from dubins_rrt_ros.planning import Path, Settings, audit_path
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -44,3 +46,18 @@ def test_most_tunnels_are_solved_and_none_by_a_longer_path(tmp_path, capsys):
 def test_wrong_usage_is_refused(flags, words, capsys):
     assert main(["families", *flags]) == 2
     assert words in capsys.readouterr().err
+
+
+@needs_compiled
+def test_ways_are_compared_with_the_best_that_is_known(monkeypatch):
+    for name, value in {"SEEDS": 2, "REFERENCE_SAMPLES": 64, "CLOSED_PLACES": 2, "CLOSED_TIME": 0.2}.items():
+        monkeypatch.setattr(ways, name, value)
+    line = ways.measured(2, Settings(samples=64, planning_time=20, seed=0))
+    assert line["kind"] == "depot" and line["solved"] == 2 and min(line["longer"]) >= 0
+    table = list(ways.report([line]))
+    assert len(table) == 1 + len(BUILDINGS) and table[3].split()[:2] == ["depot", "2"]
+
+
+def test_a_building_is_always_the_same():
+    first, second = building("office", 0, 3), building("office", 0, 3)
+    assert (first.map.data == second.map.data).all() and (first.start, first.goal) == (second.start, second.goal)

@@ -15,6 +15,11 @@ from dubins_rrt_ros.cli.common.progress import with_bar
 from dubins_rrt_ros.planning import Settings, plan
 
 from .problems import FAMILIES, constructed
+from .ways import measured
+from .ways import report as ways_report
+
+#: Name of the family of buildings with several ways round, which is measured otherwise than the others.
+WAYS = "ways"
 
 #: Lower limits of the bands of room to spare that are counted apart [m].
 BANDS = 0.001, 0.005, 0.01
@@ -28,11 +33,13 @@ def add_arguments(parser: Parser) -> None:
         parser, usage="[options]",
         description="Plans problems around random Dubins paths - tunnels carved around them, clutter and tubes of polygons that "
                     "leave the vehicle a millimetre to ten centimetres - and reports for each family and room to spare how many "
-                    "are solved, how soon, and how many paths are longer than the constructed one.",
+                    "are solved, how soon, and how many paths are longer than the constructed one. The family ways, which takes "
+                    "long, is of buildings with several ways round, and how much longer paths are than the best that is known.",
         notes="A family, a number and a seed always give the same problem.",
         examples=["dubins_rrt families --problems 5 --families tunnel --time 0.2"],
         exit_status="0 all are solved, 1 some are not, 2 wrong usage, 130 interrupted")
-    parser.add_argument("--families", metavar="NAME[,NAME]", help=f"only these; default all: {', '.join(FAMILIES)}")
+    parser.add_argument("--families", metavar="NAME[,NAME]",
+                        help=f"only these; default all but {WAYS}: {', '.join((*FAMILIES, WAYS))}")
     parser.add_argument("--problems", metavar="N", type=int, default=200, help="number of problems of each family; default 200")
     parser.add_argument("--seed", metavar="S", type=int, default=0, help="seed of the problems and of the search; default 0")
     parser.add_argument("--time", metavar="s", type=float, default=1.0, help="time limit of a problem [s]; default 1")
@@ -46,18 +53,22 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.out)
     names = arguments.families.split(",") if arguments.families else list(FAMILIES)
     for name in names:
-        if name not in FAMILIES:
-            raise UsageError(f"there is no family {name!r}; there are {', '.join(FAMILIES)}")
+        if name not in (*FAMILIES, WAYS):
+            raise UsageError(f"there is no family {name!r}; there are {', '.join((*FAMILIES, WAYS))}")
     settings = Settings(planning_time=arguments.time, seed=arguments.seed)
     tasks = [(name, number) for name in names for number in range(arguments.problems)]
     planned = with_bar((_line(name, number, settings) for name, number in tasks), len(tasks), " problems")
     lines = list(_written(planned, arguments.out))
-    print("\n".join(_report(names, lines)))
-    return 0 if all(line["solved"] for line in lines) else 1
+    ways = [line for line in lines if line["family"] == WAYS]
+    others = [line for line in lines if line["family"] != WAYS]
+    print("\n".join([*(_report(names, others) if others else ()), *(ways_report(ways) if ways else ())]))
+    return 0 if all(line["solved"] for line in others) else 1
 
 
 def _line(family: str, number: int, settings: Settings) -> dict[str, Any]:
     """Plan a problem; return what there is to say of it."""
+    if family == WAYS:
+        return measured(number, settings)
     problem = constructed(family, settings.seed, number)
     answer = plan(problem.problem, settings)
     longer = answer.length / problem.length - 1 if answer.length is not None else None
