@@ -204,13 +204,13 @@ class _Call:
         """Report a better path, once it is shortened and audited, and the state of the search from time to time."""
         improved = search.ready and self._is_audit_due(search) and self._is_right(search.path, search)
         if improved or self._is_report_due(search.samples):
-            self._tell(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
+            self._report_progress(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
 
     def _is_report_due(self, samples: int) -> bool:
         by_samples = 0 < self._report_samples <= samples - self._samples_reported
         return by_samples or self._elapsed - self._last_report >= REPORT_INTERVAL
 
-    def _tell(self, samples: int, improved: bool, snapshot: Callable[[], Plan], tree: Callable[[], Tree]) -> None:
+    def _report_progress(self, samples: int, improved: bool, snapshot: Callable[[], Plan], tree: Callable[[], Tree]) -> None:
         self._last_report = self._elapsed
         if self._report_samples:
             self._samples_reported = samples - samples % self._report_samples

@@ -90,7 +90,7 @@ class Listener:
 
     # From the planner.
 
-    def _tell(self, document: Document) -> None:
+    def _send(self, document: Document) -> None:
         self.latest[document["type"]] = document
         self._publish(document)
 
@@ -101,21 +101,21 @@ class Listener:
     def _take_map(self, message: OccupancyGrid) -> None:
         grid = grid_from(message, message.header.frame_id, MAX_MAP_CELLS)
         self._frame = message.header.frame_id
-        self._tell(messages.map_document(grid, "map", is_new="map" not in self.latest))
+        self._send(messages.map_document(grid, "map", is_new="map" not in self.latest))
 
     def _take_path(self, message: PathMessage) -> None:
         poses = path_poses(message)
         self._poses = poses[np.linspace(0, len(poses) - 1, min(len(poses), MOST_POSES)).astype(int)] if len(poses) else poses
-        self._tell_answer()
+        self._send_answer()
 
     def _take_status(self, message: DiagnosticStatus) -> None:
         self._status, self._message = {item.key: item.value for item in message.values}, message.message
-        self._tell_answer()
+        self._send_answer()
 
-    def _tell_answer(self) -> None:
+    def _send_answer(self) -> None:
         values = self._status
         figures = {name: _number(values.get(key)) for name, key in FIGURES.items()}
-        self._tell({"type": "answer", "id": 0, "quick": False, "final": True, "status": values.get("error_name", ""),
+        self._send({"type": "answer", "id": 0, "quick": False, "final": True, "status": values.get("error_name", ""),
                     "message": self._message, "path": np.round(self._poses, 4).ravel().tolist(), "first_length": None,
                     "samples": int(_number(values.get("samples")) or 0), "location": self._location,
                     "tree_nodes": int(_number(values.get("tree_nodes")) or 0), **figures})
@@ -130,20 +130,20 @@ class Listener:
         location = next(iter(places), None)
         if location != self._location:
             self._location = location
-            self._tell_answer()
+            self._send_answer()
         for marker in message.markers:
             if marker.type == Marker.ARROW and marker.ns in ("start", "goal"):
-                self._tell_pose(marker.ns, pose_from(marker.ns, marker.pose))
+                self._send_pose(marker.ns, pose_from(marker.ns, marker.pose))
 
     def _take_pose(self, name: str, message: PoseStamped | PoseWithCovarianceStamped) -> None:
         try:
-            self._tell_pose(name, pose_from(name, message))
+            self._send_pose(name, pose_from(name, message))
         except ValueError:
             return  # which the planner tells in its status
 
-    def _tell_pose(self, name: str, pose: tuple[float, float, float]) -> None:
+    def _send_pose(self, name: str, pose: tuple[float, float, float]) -> None:
         self._ends[name] = pose
-        self._tell({"type": "poses", **self._ends})
+        self._send({"type": "poses", **self._ends})
 
     def _read_parameters(self) -> None:
         if self._parameters.services_are_ready():
@@ -154,7 +154,7 @@ class Listener:
         values = {name: parameter_value_to_python(value) for name, value in zip(NAMES, found, strict=False)}
         document = {"type": "parameters", "values": {name: value for name, value in values.items() if value is not None}}
         if document != self.latest.get("parameters"):
-            self._tell(document)
+            self._send(document)
 
     # From the page.
 

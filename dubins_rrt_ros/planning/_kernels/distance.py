@@ -105,8 +105,8 @@ def reached_columns(bounds: cython.float[:, ::1], cell: cython.double, first_row
 @cython.inline
 @cython.exceptval(check=False)
 def is_reached(bounds: cython.float[:, ::1], cell: cython.double, column: cython.int, first_row: cython.int,
-               last_row: cython.int, aside: cython.int) -> cython.bint:
-    """Return whether a column has such a cell, which is `aside` columns beside the box."""
+               last_row: cython.int, gap: cython.int) -> cython.bint:
+    """Return whether a column has such a cell, which is `gap` columns beside the box."""
     row: cython.int
     beyond: cython.double
     at_most: cython.double
@@ -114,7 +114,7 @@ def is_reached(bounds: cython.float[:, ::1], cell: cython.double, column: cython
         beyond = max(0, max(first_row - row, row - last_row + 1))
         # A cell for what `reached_columns` says, sqrt(2) for what the bounds are lower by, and the rest for rounding.
         at_most = max(0.0, cython.cast(cython.double, bounds[row, column])) / cell + 2.5
-        if at_most * at_most >= beyond * beyond + aside * aside:
+        if at_most * at_most >= beyond * beyond + gap * gap:
             return True
     return False
 

@@ -30,9 +30,9 @@ MOST_LONGER = 1e-3
 MOST_TURNS = 3
 #: Number of sections that are tried for each short arc.
 TRIES = 200
-#: Least and greatest standard deviation by which that pose is moved aside, and that by which it is turned, in lengths of a short
-#: arc; and share of the tries without such a pose.
-LEAST_ASIDE, MOST_ASIDE, TURN, DIRECT_SHARE = 0.1, 3.0, 0.6, 0.1
+#: Least and greatest standard deviation by which that pose is moved to the side, and that by which it is turned, in lengths of a
+#: short arc; and share of the tries without such a pose.
+LEAST_OFFSET, MOST_OFFSET, TURN, DIRECT_SHARE = 0.1, 3.0, 0.6, 0.1
 #: Rounding of poses and of lengths along a path [m, rad].
 SAME = 1e-11
 
@@ -146,9 +146,9 @@ class _Merger:
             return [dubins.shortest(first, last, path.radius)]
         x, y, theta = _pose_at(path, middle)
         short = min(SHORT, SHORT_SHARE * path.radius)
-        size = math.exp(self._rng.uniform(math.log(LEAST_ASIDE), math.log(MOST_ASIDE)))
-        aside, turn = short * self._rng.normal(size=2) * (size, TURN)
-        through = x - aside * math.sin(theta), y + aside * math.cos(theta), wrap(theta + turn / path.radius)
+        size = math.exp(self._rng.uniform(math.log(LEAST_OFFSET), math.log(MOST_OFFSET)))
+        offset, turn = short * self._rng.normal(size=2) * (size, TURN)
+        through = x - offset * math.sin(theta), y + offset * math.cos(theta), wrap(theta + turn / path.radius)
         return [dubins.shortest(first, through, path.radius), dubins.shortest(through, last, path.radius)]
 
     def _is_free(self, curve: DubinsCurve) -> bool:
