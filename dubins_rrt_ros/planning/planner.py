@@ -167,8 +167,8 @@ class _Call:
         deadline = self._deadline
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
-                        self._report_samples, self._usable_seed(field))
-        for step, may_end in enumerate(() if deadline.is_due else search.run()):
+                        self._report_samples)
+        for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field))):
             if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
                 return trapped
             if search.best >= 0 and self._time_to_found is None:
@@ -242,18 +242,18 @@ class _Call:
         simple = path
         if simplify and not search.objective.is_length:
             known = self._best if self._best and self._best.is_simple and self._best.found == path else None
-            simple = known.path if known else self._simplified(search)
+            simple = known.path if known else self._simplified(path, search)
         if is_last:
             simple = search.without_short_arcs(simple)
         self._found_cost = search.cost
-        return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.found_by,
+        return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
                         search.objective.path_cost(simple), path, simplify or search.objective.is_length)
 
-    def _simplified(self, search: Search) -> Path:
-        """Return a simpler form of the best path, for which there is time kept once it is known how long that takes."""
+    def _simplified(self, path: Path, search: Search) -> Path:
+        """Return a simpler form of a path, for which there is time kept once it is known how long that takes."""
         self._deadline.reserve = AUDIT_RESERVE * self._audit_took
         began = self._elapsed
-        simple = search.simplified()
+        simple = search.simplified(path)
         self._simplifying_took = self._elapsed - began
         return simple
 
@@ -285,7 +285,7 @@ class _Call:
                 self._bound = self._cost_bound
         if self._best:
             return self._with_path(self._best, running=True)
-        message = f"No path so far: {self._drawn(search.samples, search.size)}."
+        message = f"No path so far: {self._drawn(search.samples, search.growing.size)}."
         return self._plan(Status.TIMEOUT, message, search.tree, samples=search.samples)
 
     def _end_of(self, search: Search, field: ClearanceField) -> Plan:
@@ -337,7 +337,7 @@ class _Call:
         search.wait()
         if trapped := self._trapped(search, field):
             return trapped
-        tree, drawn = search.tree, self._drawn(search.samples, search.size)
+        tree, drawn = search.tree, self._drawn(search.samples, search.growing.size)
         if search.done:
             what, more = "No path found", "samples"
         else:

@@ -94,7 +94,7 @@ def test_rrt_smooths_its_one_path():
     assert search.samples == plain.samples
     assert search.path.length == pytest.approx(search.length)
     assert search.length == min(lengths) < plain.length
-    np.testing.assert_array_equal(search.tree.poses[:plain.size], plain.tree.poses)
+    np.testing.assert_array_equal(search.tree.poses[:plain.growing.size], plain.tree.poses)
 
 
 @pytest.mark.slow

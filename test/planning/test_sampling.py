@@ -176,7 +176,7 @@ def test_nodes_are_added_only_where_a_path_shorter_than_the_best_may_lead(shortc
     at_blocks = []
     for _ in steps_of(search):
         if search.samples % rrt.BLOCK == 0 and search.length is not None:
-            at_blocks.append((search.size, search.length))
+            at_blocks.append((search.growing.size, search.length))
     assert at_blocks
     nodes = search.tree.poses
     for size, length in at_blocks:

@@ -44,7 +44,7 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
         for _ in steps_of(search):
             tree = search.tree
             tree.check(field, VEHICLE)
-            assert len(tree) == search.size
+            assert len(tree) == search.growing.size
             assert step_size == 0 or tree.lengths.sum(axis=1).max() <= step_size * (1 + 1e-9)
             np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
             batches += 1

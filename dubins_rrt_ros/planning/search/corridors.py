@@ -48,16 +48,21 @@ INTERVAL, PATIENCE = 32 if COMPILED else 512, 8
 
 
 class Corridors:
-    """The corridors that may be shorter than the best path; `next_path` tries one of them."""
+    """The corridors that may be shorter than the best path; `next_path` tries one of them.
+
+    Attributes:
+        next_at: number of samples after which the next try is due.
+    """
 
     def __init__(self, problem: Problem, objective: Objective, from_start: CostToGo, to_goal: CostToGo, limit: float, seed: int,
-                 interrupted: Callable[[], bool]):
+                 interrupted: Callable[[], bool], samples: int):
         """Find them.
 
         Args:
             from_start, to_goal: the costs, both of them bounds.
             limit: length below which a way over a saddle matters [m].
             interrupted: called every few milliseconds; True ends a try early.
+            samples: number of samples used so far.
         """
         self._problem, self._objective, self._interrupted = problem, objective, interrupted
         self._checker, self._edge_cost = objective.field.collision_checker(problem.vehicle), objective.edge_cost()
@@ -66,19 +71,29 @@ class Corridors:
         self._sources: list[Detours] = [SaddleDetours(problem, self._squares, objective, from_start, to_goal, limit),
                                         ClosedPlaces(self._squares, self._rng)]  # the next one to ask is the first
         self._in_vain = dict.fromkeys(self._sources, 0)
+        self.next_at = samples + self._interval
 
     @property
     def exhausted(self) -> bool:
         """True if no detour is left, or too many were in vain."""
         return not self._sources
 
+    def is_due(self, samples: int) -> bool:
+        """Return True if a try is due after so many samples."""
+        return not self.exhausted and samples >= self.next_at
+
     @property
-    def interval(self) -> int:
+    def _interval(self) -> int:
         """The number of samples until the next try is due: the more were in vain, the more."""
         return INTERVAL * (1 + min(self._in_vain.values()) // PATIENCE)
 
-    def next_path(self, path: Path) -> Path | None:
-        """Try one more corridor; return the path with it, if that is shorter."""
+    def next_path(self, path: Path, samples: int) -> Path | None:
+        """Try one more corridor, after so many samples; return the path with it, if that is shorter."""
+        shorter = self._shorter_path(path)
+        self.next_at = samples + self._interval
+        return shorter
+
+    def _shorter_path(self, path: Path) -> Path | None:
         source = self._sources.pop(0)
         pieces = path.cut(PIECE * self._problem.vehicle.maneuver_scale)
         detour = source.next(pieces)

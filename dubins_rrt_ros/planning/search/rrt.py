@@ -29,12 +29,11 @@ fixed by the samples alone, so that the path depends neither on the time nor on 
 import math
 import time
 from collections.abc import Generator, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from .._kernels import COMPILED
-from .._kernels.rrt import RrtKernel
-from .._kernels.tree import SearchTree
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..deadline import Deadline, never
@@ -44,15 +43,14 @@ from .corridors import Corridors
 from .cost import Objective
 from .cost_bounds import CostBounds
 from .cost_to_go import CostToGo
+from .growing_tree import GrowingTree
 from .hybrid_astar import HybridAStarRuns
 from .lower_bound import lower_bound
 from .sampling import Sampler
 from .short_arcs import merge_short_arcs
 from .smoothing import Smoother
-from .tree import Tree, path_to
+from .tree import Tree
 
-NEAR_FACTOR = math.e * (1 + 1 / 3)
-MOST_NEAR = 512
 #: Number of samples in a block. Blocks are drawn whole, so that the draws depend neither on the time nor on the budget.
 BLOCK = 512
 #: Number of samples in the first batch, and time that a batch is to take [s]: a cancellation waits for its end.
@@ -76,74 +74,87 @@ WAIT = 0.002
 TIME_FOR_BOUND = 0.25
 
 
+class Informed(NamedTuple):
+    """What an informed search has besides.
+
+    Attributes:
+        runs: hybrid A*, for a first path and for others.
+        bounds: lower bounds of the costs from the start and to the goal.
+    """
+
+    runs: HybridAStarRuns
+    bounds: CostBounds
+
+
 class Search:
     """A search under way. Its state after a sample is a function of problem, seed and settings but for budget and time.
 
     Attributes:
-        samples: number of samples used so far.
-        best: the node that reaches the goal at the least cost, or -1.
-        found_by: what found the path there, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one.
-        objective: what is minimised.
+        growing: the tree, with the best path.
         ready: True if there is a path whose smoothing has been done; better ones that are still to be smoothed do not matter.
-        bound: the cost-to-go as a lower bound, once it is one, or None.
     """
 
     def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo | None,
-                 deadline: Deadline | None = None, report_samples: int = 0, seed_path: Path | None = None):
+                 deadline: Deadline | None = None, report_samples: int = 0):
         """Prepare a search.
 
         Args:
             to_goal: needed with `informed`, and with headings along the cost-to-go.
-            seed_path: a free path of the problem, in place of the first one of hybrid A*.
             deadline: when it is over what is under way is cut short; the steps of `run` that follow it are unspecified.
             report_samples: number of samples after each of which a step of `run` ends; 0 for any.
         """
-        self.objective = Objective.of(problem, settings, field)
-        corners = problem.map.corners()
-        lowest, extent = corners.min(axis=0), np.ptp(corners, axis=0)
-        vehicle = problem.vehicle
-        self.samples = 0
-        self.best = -1
-        self.found_by = ""
+        self.growing = GrowingTree(problem, settings, field)
         self.ready = False
-        self.bound: CostToGo | None = None
-        self._report_samples = report_samples
+        self._problem, self._settings, self._report_samples = problem, settings, report_samples
         self._deadline = deadline or Deadline(math.inf, never)
-        self._problem, self._settings, self._seed_path = problem, settings, seed_path
-        self._tree = SearchTree(root=problem.start, radius=vehicle.turning_radius, corner=lowest, extent=extent)
-        self._kernel = RrtKernel(
-            tree=self._tree, checker=field.collision_checker(vehicle), edge_cost=self.objective.edge_cost(),
-            step=settings.step_size, near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=problem.goal,
-            tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
-        self._runs: HybridAStarRuns | None = None
-        self._bounds: CostBounds | None = None
+        self._informed: Informed | None = None
         if settings.informed and to_goal:
             length_to_goal = to_goal if self.objective.is_length else CostToGo.to_goal(problem, field)
-            self._runs = HybridAStarRuns(problem, settings, field, to_goal, length_to_goal)
-            self._bounds = CostBounds(problem, field, to_goal, length_to_goal, self.objective)
+            self._informed = Informed(HybridAStarRuns(problem, settings, field, to_goal, length_to_goal),
+                                      CostBounds(problem, field, to_goal, length_to_goal, self.objective))
         self._corridors: Corridors | None = None
-        self._next_corridor = 0  # number of samples after which one is tried
         self._sampler = Sampler(problem, settings, field, to_goal)
         self._smoother = Smoother(self.objective, settings.seed, self._deadline.poll)
 
     @property
-    def size(self) -> int:
-        """The number of nodes of the tree."""
-        return int(self._tree.size)
+    def samples(self) -> int:
+        """The number of samples used so far."""
+        return self.growing.samples
+
+    @property
+    def best(self) -> int:
+        """The node that reaches the goal at the least cost, or -1."""
+        return self.growing.best
+
+    @property
+    def objective(self) -> Objective:
+        """What is minimised."""
+        return self.growing.objective
+
+    @property
+    def bound(self) -> CostToGo | None:
+        """The cost-to-go as a lower bound, once the search needed it, or None."""
+        bounds = self._informed.bounds if self._informed else None
+        return bounds.to_goal if bounds and bounds.from_start else None
 
     @property
     def tree(self) -> Tree:
         """A copy of the tree."""
-        return Tree.copy_of(self._tree)
+        return self.growing.copy()
 
     @property
     def path(self) -> Path | None:
         """The best path so far, or None; the tree is not copied for it."""
-        return path_to(self.best, self._tree) if self.best >= 0 else None
+        return self.growing.path
 
-    def simplified(self) -> Path:
-        """Return the best path with fewer curves, at hardly more cost; the same where the cost is the length."""
-        return self._smoother.simplify(path_to(self.best, self._tree))
+    @property
+    def cost(self) -> float:
+        """The cost of the best path so far [m]; infinite where there is none."""
+        return self.growing.cost
+
+    def simplified(self, path: Path) -> Path:
+        """Return a path with fewer curves, at hardly more cost; the same where the cost is the length."""
+        return self._smoother.simplify(path)
 
     def without_short_arcs(self, path: Path) -> Path:
         """Return a path with its short arcs merged, as far as there is time; the same where paths are not smoothed."""
@@ -153,14 +164,9 @@ class Search:
 
     def tree_with(self, path: Path) -> Tree:
         """Return a copy of the tree, with a path that is not the best as a branch of its own."""
-        if self.best >= 0 and path == self.path:
+        if path == self.path:
             return self.tree
         return self.tree.with_path(path, self.objective.curve_costs(path))
-
-    @property
-    def cost(self) -> float:
-        """The cost of the best path so far [m]; infinite where there is none."""
-        return float(self._tree.costs[self.best]) if self.best >= 0 else math.inf
 
     @property
     def length(self) -> float | None:
@@ -178,19 +184,22 @@ class Search:
     def _is_rrt(self) -> bool:
         return self._settings.planner == "rrt"
 
-    def run(self) -> Iterator[bool]:
+    def run(self, seed_path: Path | None = None) -> Iterator[bool]:
         """Search, in steps of a few milliseconds each.
+
+        Args:
+            seed_path: a free path of the problem, in place of the first one of hybrid A*.
 
         Yields:
             True if the search may be ended here: with the samples so far as its budget it would have come to the same end.
         """
-        if self._seed_path:
-            yield from self._begin_with(self._seed_path)
+        if seed_path:
+            yield from self._begin_with(seed_path)
             self._start_bounds()
-        elif self._runs:
-            yield from self._find_first_path(self._runs)
+        elif self._informed:
+            yield from self._find_first_path(self._informed.runs)
             if self.best >= 0:
-                yield from self._improve_first_path(self._runs)
+                yield from self._improve_first_path(self._informed.runs)
             self._start_bounds()
         batch = FIRST_BATCH
         while not self.done:
@@ -198,7 +207,7 @@ class Search:
 
     def wait(self, seconds: float = math.inf) -> bool:
         """Wait for so long until nothing of the search runs in the background; return True if so."""
-        return self._runs is None or self._runs.wait(seconds)
+        return self._informed is None or self._informed.runs.wait(seconds)
 
     def make_bound(self, seconds: float = math.inf) -> CostToGo | None:
         """Make the cost-to-go a lower bound, and return it.
@@ -206,21 +215,20 @@ class Search:
         Returns:
             None unless the search is informed, and where what runs in the background does not end within that time.
         """
-        if not self._bounds or not self.wait(seconds) or (seconds < math.inf and not self._bounds.wait(seconds)):
+        if not self._informed or not self.wait(seconds) or (seconds < math.inf and not self._informed.bounds.wait(seconds)):
             return None
-        return self._bounds.make_to_goal()
+        return self._informed.bounds.make_to_goal()
 
     def make_length_bound(self) -> CostToGo | None:
         """Make the length to the goal a lower bound, and return it; None unless informed. To be called after `make_bound`."""
-        return self._bounds.make_length_to_goal() if self._bounds else None
+        return self._informed.bounds.make_length_to_goal() if self._informed else None
 
     def _may_end(self, smoothing_is_due: bool = False) -> bool:
         return self.best < 0 or (not smoothing_is_due and (self.samples > 0 or self._is_rrt))
 
     def _begin_with(self, seed_path: Path) -> Iterator[bool]:
         """Take a known path for the first one; it was smoothed before, so that one round is enough."""
-        self._insert(seed_path, -1)
-        self.found_by = "seed_path"
+        self.growing.insert_if_better(seed_path, "seed_path")
         yield from self._smooth(range(ROUNDS - 1, ROUNDS if self._settings.shortcut else ROUNDS - 1))
         self.ready = True
         yield self._may_end()
@@ -231,7 +239,7 @@ class Search:
         while left > 0 and self.best < 0 and not runs.exhausted:
             expansions = min(EXPANSIONS, left)
             left -= expansions
-            self._insert_if_better(runs.run(expansions, math.inf, self._deadline.poll))
+            self.growing.insert_if_better(runs.run(expansions, math.inf, self._deadline.poll), "hybrid_astar")
             yield self._may_end(smoothing_is_due=self._settings.shortcut)
 
     def _improve_first_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
@@ -249,7 +257,7 @@ class Search:
 
     def _is_nearly_best(self) -> bool:
         """Return True if the best path is most likely so near to the shortest that it need not wait for what is found next."""
-        path, to_goal = self.path, self._bounds.to_goal if self._bounds else None
+        path, to_goal = self.path, self._informed.bounds.to_goal if self._informed else None
         return (path is not None and len(path.words) <= EARLY_CURVES + 1
                 and self.cost <= EARLY_COST * lower_bound(self._problem, to_goal))
 
@@ -262,22 +270,23 @@ class Search:
             yield self._may_end()
 
     def _run_ended(self, runs: HybridAStarRuns, expansions: int) -> bool:
-        self._insert_if_better(runs.run(expansions, self.cost, self._deadline.poll))
+        self.growing.insert_if_better(runs.run(expansions, self.cost, self._deadline.poll), "hybrid_astar")
         return runs.between_runs or runs.exhausted
 
     def _start_bounds(self) -> None:
         """Start to compute lower bounds in the background; not earlier, as the first path would have to wait for them."""
-        if self._bounds:
+        if self._informed:
+            bounds = self._informed.bounds
             if self.best < 0:
-                self._bounds.to_goal.finish()  # hybrid A* goes on in the background of the samples, and asks for it too
-                self._bounds.length_to_goal.finish()
-            self._bounds.start(from_start=not self._is_rrt)
+                bounds.to_goal.finish()  # hybrid A* goes on in the background of the samples, and asks for it too
+                bounds.length_to_goal.finish()
+            bounds.start(from_start=not self._is_rrt)
 
     def _take_block(self, batch: int) -> Generator[bool, None, int]:
         """Draw a block of samples and take it, batch by batch; return the size of the next batch."""
         yield from self._wait_for_bounds()
         is_limited = self._limit_to_best()
-        block = self._sampler.draw(BLOCK, self._bounds.from_start if self._bounds else None, self.path)
+        block = self._sampler.draw(BLOCK, self._informed.bounds.from_start if self._informed else None, self.path)
         used = 0
         while used < BLOCK and not self.done:
             if not is_limited:
@@ -289,7 +298,7 @@ class Search:
                 yield from self._wait_for_runs()
                 self._end_block()
             rounds = self._rounds_due(had_path, used == BLOCK)
-            corridor_is_due = self._is_corridor_due()
+            corridor_is_due = self._corridors is not None and self._corridors.is_due(self.samples)
             yield self._may_end(smoothing_is_due=bool(rounds) or corridor_is_due)
             yield from self._smooth(rounds)
             if corridor_is_due:
@@ -302,13 +311,13 @@ class Search:
 
     def _wait_for_bounds(self) -> Iterator[bool]:
         """Wait for the bounds that `_limit_to_best` needs, unless there is time to compute one of them here."""
-        if self._bounds and self.best >= 0 and self._bounds.from_start is None:
-            while self._deadline.left < TIME_FOR_BOUND and not self._bounds.wait(WAIT):
+        if self._informed and self.best >= 0 and self._informed.bounds.from_start is None:
+            while self._deadline.left < TIME_FOR_BOUND and not self._informed.bounds.wait(WAIT):
                 yield self._may_end()
 
     def _wait_for_runs(self) -> Iterator[bool]:
         """Wait for hybrid A* in the background."""
-        while self._runs and not self._runs.wait(WAIT):
+        while not self.wait(WAIT):
             yield self.best < 0
 
     def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
@@ -316,18 +325,11 @@ class Search:
         left = self._settings.samples - self.samples
         end = min(begin + min(size, left if left > 0 else size, self._until_report()), BLOCK)
         if self._corridors and not self._corridors.exhausted:
-            end = min(end, begin + self._next_corridor - self.samples)
-        self._kernel.reserve(end - begin)
+            end = min(end, begin + self._corridors.next_at - self.samples)
         started = time.perf_counter()
         # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
-        is_rrt = self._is_rrt or (self._runs is not None and self.best < 0)
-        before = self.cost
-        next_one = (self._kernel.rrt if is_rrt else self._kernel.rrt_star)(block, begin, end)
+        next_one = self.growing.take(block, begin, end, self._is_rrt or (self._informed is not None and self.best < 0))
         took, taken = time.perf_counter() - started, next_one - begin
-        self.samples += taken
-        self.best = self._kernel.best_goal_node()
-        if self.cost < before:
-            self.found_by = "rrt" if is_rrt else "rrt_star"
         return next_one, min(max(1, int(BATCH_TIME * taken / max(took, 1e-6))), 2 * size, BLOCK)
 
     def _until_report(self) -> int:
@@ -336,43 +338,35 @@ class Search:
 
     def _end_block(self) -> None:
         """Take what hybrid A* found in the background, and let it go on."""
-        self._tree.rehash()
-        if not self._runs:
+        self.growing.rehash()
+        if not self._informed:
             return
-        self._insert_if_better(self._runs.collect())
-        if not self._runs.exhausted:
+        runs = self._informed.runs
+        self.growing.insert_if_better(runs.collect(), "hybrid_astar")
+        if not runs.exhausted:
             has_footprint = bool(self._problem.vehicle.footprint)
             expansions = BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS
-            self._runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost,
-                             lambda: self._deadline.is_over)
+            runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost, lambda: self._deadline.is_over)
 
     def _limit_to_best(self) -> bool:
         """Draw and add only what can be on a cheaper path than the best, and forget other nodes; False where nothing limits."""
-        if not self._bounds or self.best < 0:
+        if not self._informed or self.best < 0:
             return False
-        from_start = self._bounds.from_start
+        bounds = self._informed.bounds
+        from_start = bounds.from_start
         if from_start is None:
-            from_start = self._bounds.make_from_start()  # first, as it was started last and may not be under way yet
-            self.bound = self.make_bound()
+            from_start = bounds.make_from_start()  # first, as it was started last and may not be under way yet
+            self.make_bound()
             if self._settings.shortcut and not self._is_rrt:
-                self._corridors = Corridors(self._problem, self.objective, from_start, self._bounds.to_goal, self.cost,
-                                            self._settings.seed, self._deadline.poll)
-                self._next_corridor = self.samples + self._corridors.interval
-        self._kernel.set_cost_bound(self.cost, from_start.kernel, self._bounds.to_goal.kernel)
-        wanted = self._bounds.nodes_to_keep(np.asarray(self._tree.poses)[:self.size, :2], self.cost)
-        if wanted is not None:
-            wanted[[0, self.best]] = True
-            self._tree.prune_index(wanted.astype(np.int8))
+                self._corridors = Corridors(self._problem, self.objective, from_start, bounds.to_goal, self.cost,
+                                            self._settings.seed, self._deadline.poll, self.samples)
+        self.growing.limit_to_best(bounds, from_start)
         return True
-
-    def _is_corridor_due(self) -> bool:
-        return self._corridors is not None and not self._corridors.exhausted and self.samples >= self._next_corridor
 
     def _try_corridor(self) -> None:
         """Try one more corridor that may be shorter than the best path."""
         if self._corridors and (path := self.path):
-            self._insert_if_better(self._corridors.next_path(path))
-            self._next_corridor = self.samples + self._corridors.interval
+            self.growing.insert_if_better(self._corridors.next_path(path, self.samples), "hybrid_astar")
 
     def _rounds_due(self, had_path: bool, block_ended: bool) -> range:
         """Return the rounds of smoothing that are due: all for a first path, and the last after a block, if worthwhile."""
@@ -387,20 +381,6 @@ class Search:
         for number in rounds:
             before, path = self.cost, self.path
             if path:
-                smoothed = self._smoother.smooth(path, first_round=number == 0)
-                if self.objective.path_cost(smoothed) < before:
-                    self._insert(smoothed, self.best)
+                self.growing.insert_smoothed(self._smoother.smooth(path, first_round=number == 0))
             self._smoother.record(before, self.cost)
             yield self._may_end(smoothing_is_due=number + 1 < ROUNDS)
-
-    def _insert_if_better(self, path: Path | None) -> None:
-        """Add a path that hybrid A* found to the tree, if it is the best."""
-        if path is not None and self.objective.path_cost(path) < self.cost:
-            self._insert(path, self.best if self._problem.exact_goal else -1)
-            self.found_by = "hybrid_astar"
-
-    def _insert(self, path: Path, end: int) -> None:
-        """Add a path to the tree; `end` is the node at its end, or -1 where the tree has none."""
-        pieces = path.cut(self._settings.step_size)
-        self._kernel.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
-        self.best = self._kernel.best_goal_node()
