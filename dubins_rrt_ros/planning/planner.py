@@ -306,7 +306,7 @@ class _Call:
             audited = self._audited(path, search, is_last=True) if search else AuditedPath(path, self._audit(path), tree, samples)
         except OutOfTime:
             cancelled = cancelled or self._deadline.cancelled
-            return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples, cancelled)
+            return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples)
         if not audited.audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audited.audit}. Please report it."
             return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audited.audit)
@@ -323,9 +323,10 @@ class _Call:
         """Return how long the lower bound is waited for [s]: an answer of RRT, which ends with its first path, does not wait."""
         return 0.0 if self._settings.planner == "rrt" or self._deadline.cancelled else max(0.0, self._deadline.left)
 
-    def _not_audited(self, path: Path, tree: Tree, samples: int, cancelled: bool) -> Plan:
+    def _not_audited(self, path: Path, tree: Tree, samples: int) -> Plan:
         """Return the plan without a path where one was found, but too late for its audit."""
         message = f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
+        cancelled = self._deadline.cancelled
         return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, message, tree, samples=samples, cancelled=cancelled)
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
