@@ -30,11 +30,11 @@ def cannot_leave(problem: Problem, field: ClearanceField, pose: Pose) -> bool:
             <= math.sqrt(2) * radius + problem.goal_tolerance_xy):
         return False
     size = radius / CELLS
-    ahead, beside = size * (np.arange(CELLS) + 0.5)[:, None], size * (np.arange(-CELLS, CELLS) + 0.5)
+    ahead, across = size * (np.arange(CELLS) + 0.5)[:, None], size * (np.arange(-CELLS, CELLS) + 0.5)
     farthest = np.minimum(ahead + size / 2, radius)
-    inside = np.abs(beside) - size / 2 <= radius - np.sqrt(radius**2 - farthest**2) + CLEARANCE_MARGIN
+    inside = np.abs(across) - size / 2 <= radius - np.sqrt(radius**2 - farthest**2) + CLEARANCE_MARGIN
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    middles = np.stack([pose[0] + c * ahead - s * beside, pose[1] + s * ahead + c * beside], axis=-1)
+    middles = np.stack([pose[0] + c * ahead - s * across, pose[1] + s * ahead + c * across], axis=-1)
     enough = np.zeros(inside.shape, bool)
     enough[inside] = field.at(middles[inside]) + size / math.sqrt(2) >= problem.vehicle.required_clearance
     parts, _ = ndimage.label(inside & enough, structure=np.ones((3, 3)))

@@ -194,9 +194,9 @@ class ClosedPlaces:
 
     def _close(self, free: np.ndarray, pose: np.ndarray) -> None:
         """Take the squares from a pose to the walls on its left and on its right."""
-        place, beside = self._squares.places(np.array([pose[:2], pose[:2] + self._squares.side * np.array(
+        place, neighbour = self._squares.places(np.array([pose[:2], pose[:2] + self._squares.side * np.array(
             [-math.sin(pose[2]), math.cos(pose[2])])]))
-        left = beside - place
+        left = neighbour - place
         for side in (1, -1):
             steps = np.arange(0, LONGEST_BAR * self._squares.scale, 0.5)
             columns, rows = (place + side * steps[:, None] * left).astype(int).T
