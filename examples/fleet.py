@@ -1,6 +1,6 @@
 """Ask the planners of several robots at once, each in a namespace of its own: fleet.py NAMESPACE ...
 
-Start them with: planner --ros-args -r __ns:=/robot1 -p map_file:=maze
+Start them with: ros2 run dubins_rrt_ros planner --ros-args -r __ns:=/robot1 -p map_file:=maze
 """
 
 import sys

@@ -1,6 +1,7 @@
 """Nav2's navigation servers with this planner in the place of planner_server: `ros2 launch dubins_rrt_ros nav2.launch.py`.
 
-As nav2_bringup's navigation_launch.py starts them, without composition. The map and the robot's pose come from elsewhere, such as
+As nav2_bringup's navigation_launch.py starts them, without composition, collision_monitor and docking_server: nothing checks the
+velocities of velocity_smoother. The map and the robot's pose come from elsewhere, such as
 nav2_bringup's localization_launch.py.
 """
 
@@ -20,7 +21,8 @@ REMAPPINGS = {"controller_server": [("cmd_vel", "cmd_vel_nav")], "behavior_serve
 ARGUMENTS = [
     DeclareLaunchArgument("params_file", description="the robot's parameters, with a planner_server as in nav2_params.yaml",
                           default_value=PathJoinSubstitution([FindPackageShare("dubins_rrt_ros"), "config", "nav2_params.yaml"])),
-    DeclareLaunchArgument("namespace", default_value="", description="namespace of all nodes"),
+    DeclareLaunchArgument("namespace", default_value="",
+                          description="namespace of all nodes; params_file must begin with it: /robot1: {planner_server: ...}"),
     DeclareLaunchArgument("use_sim_time", default_value="false", description="take the time from /clock"),
 ]
 

@@ -9,7 +9,8 @@ from launch_ros.substitutions import FindPackageShare
 
 CONFIG = PathJoinSubstitution([FindPackageShare("dubins_rrt_ros"), "config"])
 ARGUMENTS = [
-    DeclareLaunchArgument("map", default_value="", description="map file or installed map; empty: the map comes by topic"),
+    DeclareLaunchArgument("map", default_value="",
+                          description="map file or installed map, in place of that of params_file; empty: by topic"),
     DeclareLaunchArgument("params_file", default_value=PathJoinSubstitution([CONFIG, "planner.yaml"]),
                           description="the planner's parameters"),
     DeclareLaunchArgument("namespace", default_value="", description="namespace of the planner and of RViz"),

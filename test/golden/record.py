@@ -34,9 +34,8 @@ def main() -> int:
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--write", metavar="FILE", type=Path, help="plan all requests and record the answers")
     what.add_argument("--check", metavar="FILE", type=Path, help="plan all requests and compare with a record")
-    parser.add_argument("--peers", metavar="DIR", type=Path, default=_peers(),
-                        help="folder of problems.json and its maps, which are not part of the package; default: "
-                             "shared/peers/problems of a folder above")
+    parser.add_argument("--peers", metavar="DIR", type=Path, default=None,
+                        help="folder with maps of other projects, maps/NAME.yaml in it; requests on them are left out without it")
     arguments = parser.parse_args()
     if not kernels_compiled:
         print("The kernels are interpreted; the record is of compiled ones: python setup.py build_ext --inplace", file=sys.stderr)
@@ -102,11 +101,6 @@ def _map_file(request: Request, peers: Path | None) -> Path | None:
     folder, _, name = request.map.partition(":")
     file = OWN_MAPS / name if folder == "own" else peers / name if peers else None
     return file if file and file.is_file() else None
-
-
-def _peers() -> Path | None:
-    folders = (parent / "shared/peers/problems" for parent in Path(__file__).resolve().parents)
-    return next((folder for folder in folders if folder.is_dir()), None)
 
 
 def _machine() -> dict[str, str]:

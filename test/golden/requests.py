@@ -1,4 +1,4 @@
-"""The requests of the golden record: every planner, sampler and kind of vehicle, on our maps and on the peers'."""
+"""The requests of the golden record: every planner, sampler and kind of vehicle, on our maps and on other projects'."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ PAPER: dict[str, tuple[Pose, Pose]] = {
     "block": ((1.5, 1.5, 1.57), (14.5, 10.5, 0.0)), "maze": ((1.5, 2.0, 1.57), (13.5, 10.5, 1.57)),
     "forest": ((1.2, 1.2, 0.79), (18.8, 16.8, 0.79)),
 }
-#: The peers' problems: map, start, goal, turning radius, robot radius.
+#: Problems on other projects' maps, which are not part of this repository: map, start, goal, turning radius, robot radius.
 PEERS: dict[str, tuple[str, Pose, Pose, float, float]] = {
     "depot_a": ("depot", (12.36, -6.5, 1.5707963267948966), (20.9, 4.9, 3.141592653589793), 0.8, 0.295),
     "smoothers_a": ("smoothers_world", (2.35, 6.75, -1.5707963267948966), (13.5, 1.75, 0.0), 0.5, 0.195),
