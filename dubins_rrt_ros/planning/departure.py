@@ -216,7 +216,8 @@ def _overlap(problem: Problem) -> shapely.Geometry:
 
 def _cells(problem: Problem) -> np.ndarray:
     """Return the squares of the blocked cells around the vehicle at its start."""
-    grid = problem.map.window(problem.start[:2], problem.vehicle.circumscribed_radius)  # type: ignore[union-attr]
+    assert isinstance(problem.map, GridMap)
+    grid = problem.map.window(problem.start[:2], problem.vehicle.circumscribed_radius)
     rows, columns = np.nonzero(grid.blocked(problem.allow_unknown))
     corners = np.stack([columns, rows], axis=-1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     return np.asarray(shapely.polygons(grid.to_map_frame(corners * grid.resolution)))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.cases import needs_compiled
+from support.cases import needs_compiled, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Vehicle, audit_path, load_map, plan
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
@@ -117,3 +117,14 @@ def test_paths_that_are_not_smoothed_keep_theirs():
     problem = Problem(forest, Vehicle(1.0, 0.2), *ENDS)
     plain = [plan(problem, Settings(shortcut=False, step_size=0.5, seed=seed, planning_time=60.0)) for seed in range(3)]
     assert any(short_arcs(answer.path) for answer in plain if answer.path)
+
+
+@pytest.mark.parametrize("preferred", [0.0, 0.3])
+def test_the_longest_edge_is_kept_by_what_merges_and_simplifies(preferred):
+    """Also in the tree, which holds the path."""
+    problem = Problem(load_map("maze"), Vehicle(), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
+    settings = Settings(seed=1, samples=scaled(400), step_size=0.4, planning_time=60.0, preferred_clearance=preferred)
+    result = plan(problem, settings)
+    result.check()
+    assert result.path.lengths.sum(axis=1).max() <= 0.4 * (1 + 1e-9)
+    assert result.tree.lengths.sum(axis=1).max() <= 0.4 * (1 + 1e-9)

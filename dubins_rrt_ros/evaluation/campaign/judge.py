@@ -48,6 +48,8 @@ IN_TIME = 0.8
 CURVES = 6
 #: Of this number of problems one is planned again, which must give the same answer, and one in another way.
 OTHERS = 20
+#: Number of random paths from an end that no path is said to leave, of turns of each, and of steps of a turn.
+RANDOM_PATHS, TURNS, STEPS = 500, 4, 12
 #: Number of segments of a quarter circle where polygons are shrunk.
 QUARTER = 32
 _REFUSALS = {Status.START_OUTSIDE_MAP: "start", Status.START_OCCUPIED: "start", Status.GOAL_OUTSIDE_MAP: "goal",
@@ -172,7 +174,7 @@ def _check_failure(trial: Trial, answer: Plan) -> Iterator[str]:
     """Yield what is wrong with the statement that there is no path, or that none was found."""
     problem, settings = trial.problem, trial.settings
     if answer.status == Status.NO_VALID_PATH:
-        if trial.fits or _is_connected(problem):
+        if trial.fits or _has_a_way(problem, answer.message):
             yield f"a way leads from start to goal, but: {answer.message}"
         return
     is_spent = not settings.informed and answer.samples == settings.samples
@@ -182,6 +184,26 @@ def _check_failure(trial: Trial, answer: Plan) -> Iterator[str]:
     has_budget = settings.planning_time == AMPLE_TIME
     if trial.fits and has_budget and (settings.informed or (settings.goal_bias == 1 and settings.step_size == 0)):
         yield f"the shortest curve leads to the goal, but: {answer.message}"
+
+
+def _has_a_way(problem: Problem, message: str) -> bool:
+    """Return True if what the message says to be closed is open: an end of the path, or the way from start to goal."""
+    if "forward arc from the start" in message:
+        return _leads_on(problem, problem.start)
+    if "forward arc reaches the goal" in message:
+        x, y, theta = problem.goal
+        return _leads_on(problem, (x, y, theta + math.pi))
+    return _is_connected(problem)
+
+
+def _leads_on(problem: Problem, pose: Pose) -> bool:
+    """Return True if one of many random paths of a quarter turn's length from a pose has room to spare."""
+    rng, step = np.random.default_rng(0), math.pi / 2 * problem.vehicle.turning_radius / (TURNS * STEPS)
+    turns = rng.choice([-1.0, 0.0, 1.0], (RANDOM_PATHS, TURNS)).repeat(STEPS, axis=1) / problem.vehicle.turning_radius
+    headings = pose[2] + np.cumsum(turns, axis=1) * step
+    points = pose[:2] + np.cumsum(step * np.stack([np.cos(headings), np.sin(headings)], axis=-1), axis=1)
+    room = clearances(points.reshape(-1, 2), problem).reshape(headings.shape).min(axis=1)
+    return bool(room.max() >= problem.vehicle.inscribed_radius + step)
 
 
 def _is_connected(problem: Problem) -> bool:

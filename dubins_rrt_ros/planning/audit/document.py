@@ -50,7 +50,8 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
         yield f"map_id is {quoted(document['map_id'])}, and this map's is {map_id}: it was planned on another one"
     yield from _waypoint_findings(document, path)
     length = path.length
-    yield from _figure(document, "length", length, _ROUNDING * length)
+    for name in ("length", "path_length"):
+        yield from _figure(document, name, length, _ROUNDING * length)
     yield from _figure(document, "max_curvature", found.max_curvature, _ROUNDING * found.max_curvature)
     yield from _figure(document, "min_clearance", found.min_clearance, max(PRECISION, SHARE * found.min_clearance))
     yield from _bound_findings(document, length, "lower_bound", "gap", f"the path is {length:.6g} m long", _ROUNDING)
@@ -66,8 +67,8 @@ def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()
 
     Of the lower bounds it is judged that the path is not below them, but not that no other one is.
     """
-    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "max_curvature", "min_clearance", "gap", "cost",
-              "cost_gap", "poses", "waypoints", "waypoint_indices"}
+    judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "path_length", "max_curvature", "min_clearance", "gap",
+              "cost", "cost_gap", "poses", "waypoints", "waypoint_indices"}
     others = [name for name in document if name not in judged or name in passed_over]
     said = {"lower_bound": "lower_bound (that no path is shorter)",
             "cost_lower_bound": "cost_lower_bound (that no path costs less)"}

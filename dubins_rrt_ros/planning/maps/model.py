@@ -58,7 +58,7 @@ FINEST, FARTHEST = 1e-4, 1e8
 class _PlottableMap(Plottable):
     """A base of maps, with their pictures."""
 
-    def plot(self: "Map", ax: "Axes | None" = None) -> "Axes":  # type: ignore[misc]
+    def plot(self: "Map", ax: "Axes | None" = None) -> "Axes":  # type: ignore[misc]  # a mixin of both kinds of map
         """Draw free, occupied and unknown space, on axes or in a new pyplot figure, and return the axes.
 
         Raises:

@@ -154,13 +154,13 @@ class Search:
 
     def simplified(self, path: Path) -> Path:
         """Return a path with fewer curves, at hardly more cost; the same where the cost is the length."""
-        return self._smoother.simplify(path)
+        return self._smoother.simplify(path).cut(self._settings.step_size)
 
     def without_short_arcs(self, path: Path) -> Path:
         """Return a path with its short arcs merged, as far as there is time; the same where paths are not smoothed."""
         if not self._settings.shortcut:
             return path
-        return merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll)
+        return merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll).cut(self._settings.step_size)
 
     def tree_with(self, path: Path) -> Tree:
         """Return a copy of the tree, with a path that is not the best as a branch of its own."""
