@@ -120,7 +120,8 @@ def test_every_joint_of_a_plan_is_among_its_poses(document, capsys):
 
 
 @pytest.mark.parametrize(("field", "value"), [
-    ("length", 12.0), ("path_length", 12.0), ("length", "long"), ("length", None), ("lower_bound", 1e3), ("lower_bound", -1.0), ("lower_bound", 1.0),
+    ("length", 12.0), ("path_length", 12.0),
+    ("length", "long"), ("length", None), ("lower_bound", 1e3), ("lower_bound", -1.0), ("lower_bound", 1.0),
     ("gap", 0.0), ("gap", None), ("cost", None), ("cost_lower_bound", 99.0), ("cost_gap", 0.0),
     ("min_clearance", 1.5), ("max_curvature", 0.5), ("error_code", 208), ("error_name", "TIMEOUT"),
     ("audit", "fine"), ("map_id", "0123456789ab"), ("planner", "rrt"), ("seed", 99)])
