@@ -8,11 +8,13 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("aiohttp", reason="aiohttp comes with the extra play")
+from nav_msgs.msg import OccupancyGrid
 from support.browser import open_browser
 from support.play import serving_sessions, talk
 
 from dubins_rrt_ros.cli.watch.listener import Listener
 from dubins_rrt_ros.cli.watch.session import WatchSession
+from dubins_rrt_ros.node.qos import LATCHED
 
 START, GOAL, BLOCKED = [1.5, 5.0, 0.0], [8.5, 5.0, 0.5], [5.0, 5.0, 0.0]
 QUICK = {"planner": "rrt_star", "samples": 300, "planning_time": 15.0, "seed": 1}
@@ -92,6 +94,19 @@ def test_where_there_is_no_path_the_reason_is_shown(watched):
         return await answer_with(page, lambda answer: answer["status"] == "GOAL_OCCUPIED")
     answer = talk(watched[2], ask)
     assert answer["path"] == [] and answer["length"] is None and "obstacle" in answer["message"]
+
+
+def test_a_map_that_cannot_be_shown_is_logged_and_passed_over(watched, capfd):
+    listener = watched[1]
+    publisher = listener._node.create_publisher(OccupancyGrid, "map", LATCHED)
+    shown = listener.latest["map"]
+    publisher.publish(OccupancyGrid())
+    until(lambda: "A message cannot be shown" in capfd.readouterr().err)
+    grid = OccupancyGrid(data=[0] * 6)
+    grid.header.frame_id, grid.info.width, grid.info.height, grid.info.resolution = "map", 3, 2, 1.0
+    grid.info.origin.orientation.w = 1.0
+    publisher.publish(grid)
+    assert until(lambda: listener.latest["map"] is not shown and listener.latest["map"])["high"] == [3.0, 2.0]
 
 
 def test_parameters_are_shown_and_set_and_a_refusal_is_told(watched):

@@ -1,6 +1,5 @@
 """The ROS side of the page: what the planner publishes as documents, and what the page asks of it as messages."""
 
-import contextlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -44,12 +43,15 @@ class Listener:
     Attributes:
         latest: the newest document of each type, for pages that come later; the tree as bytes.
         pages: functions that are called with every new document, from the thread of this node.
+        lock: held while a document becomes the newest and is shown; a page that comes takes it until it is among `pages`, so that
+            it misses none and gets none after a newer one.
     """
 
     def __init__(self, planner: str):
         """Listen to a planner, by the name of its node; its topics are in its namespace."""
         self.latest: dict[str, Document | bytes] = {}
         self.pages: set[Callable[[Document | bytes], None]] = set()
+        self.lock = threading.Lock()
         self._frame = "map"
         self._poses: np.ndarray = np.empty((0, 3))
         self._status: Mapping[str, str] = {}
@@ -84,19 +86,23 @@ class Listener:
         self._thread.join()
 
     def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
-            self._executor.spin()
+        """Serve until the end; a message that cannot be shown is logged, and the next one is served."""
+        while self._context.ok():
+            try:
+                self._executor.spin_once()
+            except ExternalShutdownException:
+                break
+            except Exception as error:
+                self._node.get_logger().error(f"A message cannot be shown: {str(error) or type(error).__name__}")
         self._node.destroy_node()
 
     # From the planner.
 
-    def _send(self, document: Document) -> None:
-        self.latest[document["type"]] = document
-        self._publish(document)
-
-    def _publish(self, document: Document | bytes) -> None:
-        for show in tuple(self.pages):
-            show(document)
+    def _send(self, document: Document | bytes) -> None:
+        with self.lock:
+            self.latest["tree" if isinstance(document, bytes) else document["type"]] = document
+            for show in tuple(self.pages):
+                show(document)
 
     def _take_map(self, message: OccupancyGrid) -> None:
         grid = grid_from(message, message.header.frame_id, MAX_MAP_CELLS)
@@ -122,9 +128,7 @@ class Listener:
 
     def _take_tree(self, message: MarkerArray) -> None:
         points = [(point.x, point.y) for marker in message.markers if marker.type == Marker.LINE_LIST for point in marker.points]
-        tree = np.array([0.0, *np.ravel(points)], "<f4").tobytes()
-        self.latest["tree"] = tree
-        self._publish(tree)
+        self._send(np.array([0.0, *np.ravel(points)], "<f4").tobytes())
         places: Iterable[Point] = ((marker.pose.position.x, marker.pose.position.y) for marker in message.markers
                                    if marker.type == Marker.CYLINDER)
         location = next(iter(places), None)

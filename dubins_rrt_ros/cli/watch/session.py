@@ -23,11 +23,10 @@ class WatchSession:
         """Send what is known so far."""
         self._listener, self._send = listener, send
         self.show({"type": "hello", "watch": True, "options": messages.option_documents(), "files": []})
-        for kind in ORDER:
-            if kind in listener.latest:
-                known = listener.latest[kind]
-                self.show({**known, "new": True} if kind == "map" and isinstance(known, dict) else known)
-        listener.pages.add(self.show)
+        with listener.lock:
+            for known in (listener.latest[kind] for kind in ORDER if kind in listener.latest):
+                self.show({**known, "new": True} if isinstance(known, dict) and known["type"] == "map" else known)
+            listener.pages.add(self.show)
 
     def show(self, document: dict[str, Any] | bytes) -> None:
         """Send a document."""
