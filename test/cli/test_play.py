@@ -49,6 +49,12 @@ def test_another_name_of_this_machine_is_refused(server):
         assert get(server, path, Host=host)[0] == 403, host
 
 
+def test_a_browser_leaves_the_port_80_out(server, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.cli.play.server.HTTP_PORT", server.port)
+    path = f"/?token={server.token}"
+    assert [get(server, path, Host=host)[0] for host in ("127.0.0.1", "localhost", "evil.example")] == [200, 200, 403]
+
+
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
 def test_a_page_of_another_origin_opens_no_socket(server, origin):
     with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
@@ -131,6 +137,14 @@ def test_too_large_a_file_is_refused_unread(tmp_path, bench):
 
 # What it answers.
 
+def test_not_all_folders_are_looked_through(tmp_path, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.cli.play.workbench.MOST_FOLDERS", 3)
+    for name in "abcd":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "m.wkt").touch()
+    assert [name for name in workbench(tmp_path).files() if "/" in name] == ["a/m.wkt", "b/m.wkt"]
+
+
 def test_a_page_is_greeted_with_options_files_and_map(server, tmp_path):
     async def greeted(page):
         return await page.receive("hello"), await page.receive("map")
@@ -190,6 +204,8 @@ def test_where_there_is_no_path_the_reason_and_its_place_are_told(server):
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "vehicle": {"wings": 2}}', "wings"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "settings": {"samples": -1}}', "samples"),
     ('{"type": "draw", "points": [], "radius": 1, "obstacle": true}', ""), ('{"type": "draw"}', "points"),
+    (f'{{"type": "draw", "points": [[1{"0" * 400}, 1]], "radius": 1, "obstacle": true}}', "too large"),
+    (f'{{"type": "plan", "start": [1{"0" * 400}, 2, 0], "goal": [1, 3, 0]}}', "start pose"),
     ('{"type": "draw", "points": [[NaN, 1]], "radius": 1, "obstacle": true}', ""),
     ('{"type": "load", "name": "nowhere.yaml"}', "nowhere.yaml"), ('{"type": "copy"}', "no answer")])
 def test_what_cannot_be_done_is_refused_in_a_sentence_and_the_next_is_served(server, text, words):

@@ -13,6 +13,8 @@ from typing import Protocol
 from aiohttp import WSMsgType, web
 
 HOST = "127.0.0.1"
+#: The port that browsers leave out of an address, and so of Host and Origin.
+HTTP_PORT = 80
 #: Maximum length of a message of the page [bytes].
 MAX_MESSAGE = 1 << 20
 #: Maximum time between two signs of life of a page [s].
@@ -87,7 +89,8 @@ class PlayServer:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse what does not come from our own page on this machine."""
-        if request.host not in {f"{name}:{self.port}" for name in (HOST, "localhost")}:
+        port = "" if self.port == HTTP_PORT else f":{self.port}"
+        if request.host not in {f"{name}{port}" for name in (HOST, "localhost")}:
             raise web.HTTPForbidden(text="This server is reached as 127.0.0.1 or localhost alone.\n")
         if request.path in ("/", "/socket") and not secrets.compare_digest(
                 request.query.get("token", "").encode(), self.token.encode()):
@@ -110,8 +113,10 @@ class PlayServer:
                     session.take(message.data)
         finally:
             self._pages.discard(page)
-            await session.close()
-            sender.cancel()
+            try:
+                await session.close()
+            finally:
+                sender.cancel()
         return page
 
 

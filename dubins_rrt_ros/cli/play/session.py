@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from dubins_rrt_ros.planning import Plan, PlanningError, Problem, Progress, plan, plan_through
+from dubins_rrt_ros.planning import Plan, Problem, Progress, plan, plan_through
 from dubins_rrt_ros.planning.plan_file import to_document
 
 from ..common.output import finite
@@ -52,8 +52,10 @@ class Session:
         """End the request under way, and the thread."""
         self._closed.set()
         self._wake.set()
-        await self._task
-        self._thread.shutdown(wait=False)
+        try:
+            await self._task
+        finally:
+            self._thread.shutdown(wait=False)
 
     def take(self, text: str) -> None:
         """Take a message of the page."""
@@ -62,7 +64,7 @@ class Session:
             if not isinstance(document, dict):
                 raise ValueError("it is no object")
             self._take(document)
-        except (ValueError, TypeError, LookupError, RecursionError) as error:
+        except Exception as error:  # of any kind: the page goes on
             self._refuse(error)
         self._wake.set()
 
@@ -92,7 +94,7 @@ class Session:
     def _try(self, job: Callable[[], None]) -> None:
         try:
             job()
-        except (PlanningError, ValueError, TypeError, LookupError, OSError) as error:
+        except Exception as error:  # of any kind: the page waits for an answer
             self._refuse(error)
 
     def _refuse(self, error: Exception) -> None:

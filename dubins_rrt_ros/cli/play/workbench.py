@@ -3,6 +3,7 @@
 import json
 import os
 import threading
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,8 @@ from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS, OTHER_ENDINGS
 
 #: Maximum size of a map file that is read or written [bytes], and maximum number of cells of a grid.
 MAX_BYTES = 64 * 2**20
-#: Maximum number of files that the page offers.
-MOST_FILES = 500
+#: Maximum number of files that the page offers, and of folders in which they are sought: a home folder has too many.
+MOST_FILES, MOST_FOLDERS = 500, 2000
 
 
 class Workbench:
@@ -40,10 +41,10 @@ class Workbench:
         self._erasable = shapely.envelope(world_map.free) if isinstance(world_map, PolygonMap) else None
 
     def files(self) -> list[str]:
-        """List the names of the package's own maps and of the map files below the folder."""
+        """List the names of the package's own maps and of the map files below the folder, as far as it is looked through."""
         endings = {*MAP_ENDINGS, *OTHER_ENDINGS, *PICTURE_ENDINGS}
         found = []
-        for place, folders, names in os.walk(self.folder):
+        for place, folders, names in islice(os.walk(self.folder), MOST_FOLDERS):
             folders[:] = sorted(name for name in folders if not name.startswith("."))
             found += [os.path.relpath(os.path.join(place, name), self.folder) for name in sorted(names)
                       if Path(name).suffix.lower() in endings]

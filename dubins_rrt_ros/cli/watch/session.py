@@ -40,7 +40,7 @@ class WatchSession:
         """Take a message of the page."""
         try:
             self._take(json.loads(text))
-        except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        except Exception as error:  # of any kind: the page goes on
             self._refuse(str(error) or type(error).__name__)
 
     def _take(self, document: dict[str, Any]) -> None:
