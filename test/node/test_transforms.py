@@ -10,7 +10,7 @@ pytest.importorskip("tf2_msgs", reason="tf2_msgs is not here; .ci/messages build
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.srv import GetMap, GetPlan
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
@@ -41,13 +41,15 @@ class Broadcaster:
     def now(self, ago=0.0):
         return self.client.node.get_clock().now().nanoseconds - round(ago * 1e9)
 
-    def send(self, parent, child, pose, stamp=None, static=False):
+    def send(self, parent, child, pose, stamp=None, static=False, roll=0.0):
+        """Publish a transform: first a roll around x, then the yaw of `pose`."""
         stamp = self.now() if stamp is None else stamp
         transform = TransformStamped(child_frame_id=self.name(child))
         transform.header.frame_id, transform.header.stamp = self.name(parent), time_of(stamp)
         placed = pose_message(pose)
         transform.transform.translation.x, transform.transform.translation.y = placed.position.x, placed.position.y
-        transform.transform.rotation = placed.orientation
+        c, s, yaw = math.cos(roll / 2), math.sin(roll / 2), placed.orientation
+        transform.transform.rotation = Quaternion(x=yaw.w * s, y=yaw.z * s, z=yaw.z * c, w=yaw.w * c)
         (self._static if static else self._tf).publish(TFMessage(transforms=[transform]))
 
     def goal(self, pose, frame, stamp=0):
@@ -155,6 +157,21 @@ def test_a_goal_is_transformed_at_its_stamp_and_at_the_latest_time_where_that_is
         goal_told(client, tf.goal((5.0, -3.0, 0.0), "base", stamp), samples="300")
         client.wait_for(lambda: client.paths, "the path")
         assert poses_of(client.paths[-1])[-1] == pytest.approx((x + 5.0, 2.0, 0.0), abs=1e-6)
+
+
+def test_what_leans_after_its_transform_is_taken_by_its_yaw(drive):
+    """A slope of 8 degrees is nothing, one of 20 is told once."""
+    client, tf, process = drive()
+    client.send("start_pose", START)
+    client.call(GetMap, "get_map")
+    for roll, told in ((math.radians(8), 0), (math.radians(20), 1), (math.radians(20), 1)):
+        tf.send("map", "slope", (2.0, 2.0, 0.5), roll=roll)
+        client.paths.clear()
+        goal_told(client, tf.goal((6.0, 0.0, 0.0), "slope"), samples="300")
+        client.wait_for(lambda: client.paths, "the path")
+        expected = 2 + 6 * math.cos(0.5), 2 + 6 * math.sin(0.5), 0.5
+        assert poses_of(client.paths[-1])[-1] == pytest.approx(expected, abs=1e-6)
+        assert process.output.count("leans by") == told
 
 
 def test_a_goal_from_before_all_transforms_is_an_error_that_is_not_waited_for(drive):
