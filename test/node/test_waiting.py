@@ -184,7 +184,8 @@ def test_once_a_map_came_the_status_is_no_longer_that_there_is_none(nothing_know
     told = client.status_of(0, error_name="NO_START")
     assert told["level"] == DiagnosticStatus.WARN
     assert told["map_id"]
-    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == "NO_START", "a diagnostic that says so too")
+    client.wait_for(lambda: client.diagnostics and values_of(client.diagnostics[-1])["error_name"] == "NO_START",
+                    "a diagnostic that says so too")
 
 
 def test_a_goal_that_came_before_the_map_is_told_what_it_waits_for_and_planned_when_that_comes(nothing_known):
@@ -198,4 +199,5 @@ def test_a_goal_that_came_before_the_map_is_told_what_it_waits_for_and_planned_w
     assert told == [(DiagnosticStatus.STALE, "NO_MAP"), (DiagnosticStatus.WARN, "NO_MAP")]
     client.publish_map(occupancy(FREE))
     assert client.status_of(1, samples="300")["error_name"] == "NONE"
-    client.wait_for(lambda: values_of(client.diagnostics[-1])["error_name"] == "NONE", "a diagnostic that says so too")
+    client.wait_for(lambda: client.diagnostics and values_of(client.diagnostics[-1])["error_name"] == "NONE",
+                    "a diagnostic that says so too")
