@@ -28,6 +28,8 @@ from .worker import Job
 
 #: Time between two attempts where what is waited for comes by transforms [s]: nothing tells that one has come.
 TRANSFORM_INTERVAL = 0.5
+#: Distance to the path's end within which a waypoint need not be passed before the goal is reached [m].
+AT_THE_END = 1e-6
 
 
 #: Waypoints in their order, the last of which is the goal.
@@ -48,12 +50,14 @@ class _Request:
 
     Attributes:
         purpose: why it was made.
+        passed: number of waypoints that had been passed then, which its paths leave out.
         job: cancels it.
         has_path: True once a path of it was published.
         came: the inputs that came meanwhile, of those that can cure a failure.
     """
 
     purpose: _Purpose
+    passed: int
     job: Job | None = None
     has_path: bool = False
     came: set[str] = field(default_factory=set)
@@ -142,7 +146,7 @@ class GoalSession:
             self._report(Outcome(Status.CANCELLED, message), plan_id=self._waiting[1], revision=1)
         self._drop_waiting()
         self._replan_timer.cancel()
-        if self._request is not None and self._request.purpose is _Purpose.REPLAN:
+        if self._request is not None and self._request.purpose is _Purpose.REPLAN and not self._request.has_path:
             self._request = None  # nothing of it was told
         if failure is None or self.is_planning:
             return ""
@@ -176,7 +180,7 @@ class GoalSession:
 
     def _begin(self, goal: Goal, plan_id: int) -> None:
         """Make this the goal that counts."""
-        self._goal, self._passed, self._is_reached = goal, 0, False
+        self._goal, self._passed, self._is_reached, self._map_changed = goal, 0, False, False
         self._forget_failure()
         self._drop_waiting()
         self._plan(_Purpose.GOAL, plan_id)
@@ -191,7 +195,7 @@ class GoalSession:
         self._request = None
         if plan_id:
             self._plan_id, self._revision = plan_id, 0
-        request = _Request(purpose)
+        request = _Request(purpose, self._passed)
         with failures_reported(self._node, partial(self._conclude, request)):
             any_heading = self._dispatcher.any_goal_heading or (len(goal) > 1 and not has_rotation(goal[-1].pose))
             locate = partial(self._locate, goal[self._passed:], any_heading)
@@ -242,14 +246,17 @@ class GoalSession:
         if request.purpose is _Purpose.REPLAN and not request.has_path:
             self._plan_id, self._revision = self._dispatcher.new_id(), 0
         request.has_path = True
+        if outcome.plan is not None and outcome.plan.path is not None:
+            self._passed = request.passed  # those since are passed once more, on this path
         self._answer(outcome, last)
 
     def _answer(self, outcome: Outcome, last: bool = True) -> None:
         self._revision += 1
         self._outputs.answer(outcome, last=last, plan_id=self._plan_id, revision=self._revision, map_id=self._readiness.map_id)
-        path = outcome.plan and outcome.plan.path
-        self._progress = PathProgress(path) if path else None
-        self._to_pass = [] if outcome.plan is None else waypoint_arc_lengths(outcome.plan)
+        self._progress, self._to_pass = None, []
+        if (plan := outcome.plan) is not None and (path := plan.path) is not None:
+            self._progress = PathProgress(path)
+            self._to_pass = [passed for passed in waypoint_arc_lengths(plan) if passed < path.length - AT_THE_END]
         self._follow()
 
     def _warn(self, status: Status, message: str) -> None:

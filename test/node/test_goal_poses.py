@@ -82,20 +82,61 @@ def test_no_poses_are_refused_and_one_is_a_goal(drive):
     assert poses_of(shown(client, 2, error_name="NONE"))[-1] == pytest.approx(GOAL, abs=1e-9)
 
 
+def nearest(poses, place):
+    """The index of the pose that is nearest to a place."""
+    return int(np.argmin(np.hypot(*(poses[:, :2] - place[:2]).T)))
+
+
+def drive_past(client, poses, place):
+    """Send starts along a path until a place is passed; the index of the last one."""
+    beyond = nearest(poses, place) + 10
+    for pose in [*poses[:beyond:3].tolist(), poses[beyond].tolist()]:
+        client.send("start_pose", tuple(pose))
+        client.spin_once()
+    return beyond
+
+
+def planned_again_around(client, process, place, *walls):
+    """The path by which the one on display is replaced, once a new map has a wall there."""
+    before, row, column = client.paths[-1], int(place[1] * 10), int(place[0] * 10)
+    publish(client, process, walled(np.s_[row - 1:row + 2, column - 1:column + 2], *walls))
+    client.status_of(2, error_name="NONE")
+    return client.wait_for(lambda: client.paths[-1] is not before and client.paths[-1].poses and client.paths[-1], "another path")
+
+
 def test_a_waypoint_that_was_passed_is_left_out_when_it_is_planned_again(drive):
     client, topic, process = drive(replan_on_map_change=True)
     topic.publish(over(FIRST, GOAL))
     client.wait_for_word("over 1 waypoint")
-    path = shown(client, 1, error_name="NONE")
-    poses = poses_of(path)
-    beyond = int(np.argmin(np.hypot(*(poses[:, :2] - FIRST[:2]).T))) + 10
-    for pose in [*poses[:beyond:3].tolist(), poses[beyond].tolist()]:
-        client.send("start_pose", tuple(pose))
-        client.spin_once()
-    middle = poses[(beyond + len(poses)) // 2]
-    row, column = int(middle[1] * 10), int(middle[0] * 10)
-    publish(client, process, walled(np.s_[row - 1:row + 2, column - 1:column + 2]))
-    client.status_of(2, error_name="NONE")
-    again = client.wait_for(lambda: client.paths[-1] is not path and client.paths[-1].poses and client.paths[-1], "another path")
+    poses = poses_of(shown(client, 1, error_name="NONE"))
+    beyond = drive_past(client, poses, FIRST)
+    again = planned_again_around(client, process, poses[(beyond + len(poses)) // 2])
     assert distance_to(again, FIRST[:2]) > 0.3
     assert math.dist(poses_of(again)[-1, :2], GOAL[:2]) < 1e-9
+
+
+def test_a_waypoint_that_was_passed_while_a_better_path_was_sought_does_not_count_for_the_next(drive):
+    box = np.s_[42:58, 46:54]  # without which the first path is proved to be the shortest, and none is sought
+    client, topic, process = drive(walled(box), replan_on_map_change=True, samples=10_000_000, planning_time=3.0)
+    topic.publish(over(FIRST, SECOND, GOAL))
+    path = shown(client, 1, error_name="NONE")
+    drive_past(client, poses_of(path), FIRST)
+    assert "over 2 waypoints" not in process.output
+    client.wait_for_word("over 2 waypoints")
+    poses = poses_of(client.wait_for(lambda: client.paths[-1] is not path and client.paths[-1], "the last path"))
+    again = planned_again_around(client, process, poses[(nearest(poses, FIRST) + nearest(poses, SECOND)) // 2], box)
+    assert distance_to(again, FIRST[:2]) > 0.3
+    assert distance_to(again, SECOND) < 1e-6
+
+
+def test_a_waypoint_that_is_the_goal_too_does_not_keep_it_from_being_reached(drive):
+    client, topic, _ = drive(replan_rate=20.0)
+    topic.publish(over(FIRST, GOAL, GOAL))
+    client.wait_for_word("over 2 waypoints")
+    poses = poses_of(shown(client, 1, error_name="NONE"))
+    drive_past(client, poses[:-1], poses[-12])
+    client.send("start_pose", tuple(poses[-1] - (0.02, 0.0, 0.0)))
+    shown_before = len(client.paths)
+    client.send("start_pose", (2.0, 8.0, 0.0))  # once the goal is reached, nothing is planned from there
+    assert client.plan(START, GOAL)[1]["error_name"] == "NONE"
+    assert len(client.paths) == shown_before
