@@ -68,6 +68,11 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
 
 
+def not_audited_message(path: Path) -> str:
+    """Return what is said of a path that was found too late for its audit, in a sentence."""
+    return f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
+
+
 def _above_the_least(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], proved: str) -> str:
     """Return how far the path is above the shortest, or the cheapest, possible at most."""
     if settings.preferred_clearance_of(problem.vehicle) > 0:

@@ -8,27 +8,30 @@ measures that to a millionth of a metre, decides which ways will do.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from .answer import not_audited_message
 from .audit.departure import judge_departure
-from .audit.verdict import audit_path, driven_arcs, in_order
+from .audit.verdict import Audit, audit_path, driven_arcs, in_order
 from .collision.clearance import ClearanceField
 from .collision.raster import CLEARANCE_MARGIN
 from .curves import dubins
 from .curves.dubins import DubinsCurve
 from .curves.path import Path
-from .deadline import OutOfTime
+from .deadline import Deadline, OutOfTime
 from .maps.model import GridMap
 from .problem import Problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
 from .search.lower_bound import lower_bound
+from .settings import MIN_PLANNING_TIME, Settings
 from .text import at, metres
 from .vehicle import Point, Vehicle
+from .world import World
 
 #: Lengths driven straight on before a turn, in sizes of the vehicle, and angles turned before going straight on [rad].
 STRAIGHTS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
@@ -42,6 +45,8 @@ MAX_AUDITED = 12
 #: Number of times that the interval is halved in which the depth at the start lies; and number of swings into obstacles that are
 #: tried where no way leads out, and times that the interval between two of them is halved.
 HALVINGS, SWINGS, SWING_HALVINGS = 30, 8, 5
+#: Share of the time that is left, and maximum time [s], that is kept for the audit of the whole path.
+AUDIT_SHARE, MOST_FOR_AUDIT = 0.1, 0.1
 #: Depths below this are due to rounding [m].
 ROUNDING = 1e-6
 
@@ -59,59 +64,97 @@ class Departure(NamedTuple):
     message: str
     location: Point | None = None
 
-    def rest(self, problem: Problem) -> Problem:
-        """Return the problem from the end of the departure on."""
-        assert self.path is not None
-        return replace(problem, start=self.path.end, start_slack=0.0)
 
-    def joined(self, plan: Plan, problem: Problem, field: ClearanceField) -> Plan:
-        """Return the plan of a problem, given that of its rest; the whole path is audited."""
-        assert self.path is not None
-        objective = Objective.of(problem, plan.settings, field)
-        tree, bound = plan.tree.after(self.path, objective.curve_costs(self.path)), lower_bound(problem)
-        answer = replace(plan, problem=problem, tree=tree, lower_bound=bound, cost_lower_bound=bound)
+class WholePlans:
+    """Plans of a problem that are put together of a departure and plans of its rest; the whole paths are audited.
+
+    Attributes:
+        rest: the problem from the end of the departure on.
+        time_for_rest: limit of the time for its plan [s].
+    """
+
+    def __init__(self, problem: Problem, settings: Settings, departure: Departure, world: World, deadline: Deadline):
+        """Begin, as the search for the rest does.
+
+        Args:
+            deadline: of the request; what is left of it is for the rest, but for the time of the last audit.
+        """
+        assert departure.path is not None
+        self._problem, self._settings, self._world, self._deadline = problem, settings, world, deadline
+        self._path, self._message = departure.path, departure.message
+        self.rest = replace(problem, start=self._path.end, start_slack=0.0, world=world)
+        objective = Objective.of(problem, settings, world.field)
+        self._cost, self._curve_costs = objective.path_cost(self._path), objective.curve_costs(self._path)
+        self._audited: tuple[Path, Audit] | None = None
+        self._before = deadline.elapsed
+        self.time_for_rest = max(MIN_PLANNING_TIME, deadline.left - min(AUDIT_SHARE * deadline.left, MOST_FOR_AUDIT))
+
+    def joined(self, plan: Plan) -> Plan:
+        """Return the plan of the problem, given that of its rest."""
+        tree, bound = plan.tree.after(self._path, self._curve_costs), lower_bound(self._problem)
+        answer = replace(plan, problem=self._problem, settings=self._settings, tree=tree, lower_bound=bound,
+                         cost_lower_bound=bound, time_to_first=self._since_request(plan.time_to_first),
+                         time_to_found=self._since_request(plan.time_to_found))
         if plan.path is None:
-            return replace(answer, message=f"{plan.message[:-1]}; from where it leaves the start, {at(self.path.end[:2])}, on.")
-        path = Path.of_curves(problem.start, plan.path.end, [*self.path.curves, *plan.path.curves])
-        audit = audit_path(path, problem)
+            message = f"{plan.message[:-1]}; from where it leaves the start, {at(self._path.end[:2])}, on."
+            return replace(answer, message=message, planning_time=self._deadline.elapsed)
+        path = Path.of_curves(self._problem.start, plan.path.end, [*self._path.curves, *plan.path.curves])
+        try:
+            audit = self._audit(path)
+        except OutOfTime:
+            cancelled = self._deadline.cancelled
+            status = Status.CANCELLED if cancelled else Status.TIMEOUT
+            return self._without_path(answer, status, not_audited_message(path), time_to_first=None, cancelled=cancelled)
         if not audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return replace(answer, status=Status.UNKNOWN, message=message, path=None, cost=None, audit=audit)
+            return self._without_path(answer, Status.UNKNOWN, message, audit=audit)
         node = np.flatnonzero((plan.tree.poses == plan.path.end).all(axis=1) & (plan.tree.costs == plan.cost))[0]
-        message = f"Path of {path.length:.2f} m; {self.message}; from there on: {plan.message}"
+        message = f"Path of {path.length:.2f} m; {self._message}; from there on: {plan.message}"
         bound = min(bound, path.length)
         return replace(answer, message=message, path=path, audit=audit, start_too_near=True, lower_bound=bound,
-                       cost=float(tree.costs[node + len(self.path.curves)]), cost_lower_bound=bound)
+                       cost=float(tree.costs[node + len(self._path.curves)]), cost_lower_bound=bound,
+                       planning_time=self._deadline.elapsed)
 
-    def progress(self, report: Progress, problem: Problem, field: ClearanceField) -> Progress:
+    def progress(self, report: Progress) -> Progress:
         """Return the report on the problem, given one on its rest."""
-        def snapshot() -> Plan:
-            return self.joined(report.snapshot(), problem, field)
+        return replace(report, elapsed=self._before + report.elapsed,
+                       length=None if report.length is None else report.length + self._path.length,
+                       cost=None if report.cost is None else report.cost + self._cost,
+                       snapshot=lambda: self.joined(report.snapshot()),
+                       tree=lambda: report.tree().after(self._path, self._curve_costs))
 
-        assert self.path is not None
-        length = None if report.length is None else report.length + self.path.length
-        cost = report.cost
-        if cost is not None:
-            cost += Objective.of(problem, report.snapshot().settings, field).path_cost(self.path)
-        return replace(report, length=length, cost=cost, snapshot=snapshot, tree=lambda: snapshot().tree)
+    def _since_request(self, time: float | None) -> float | None:
+        """Return a time since the search for the rest began as one since the request [s]."""
+        return None if time is None else self._before + time
+
+    def _audit(self, path: Path) -> Audit:
+        """Audit a path, unless that was done last."""
+        if self._audited is None or self._audited[0] != path:
+            self._audited = path, audit_path(path, self._problem, self._world.obstacles, self._deadline.check)
+        return self._audited[1]
+
+    def _without_path(self, answer: Plan, status: Status, message: str, **more: Any) -> Plan:
+        return replace(answer, **{"audit": None} | more, status=status, message=message, path=None, cost=None, found_by="",
+                       waypoint_indices=(), planning_time=self._deadline.elapsed)
 
 
-def find_departure(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:
+def find_departure(problem: Problem, world: World, occupied: str, check_time: Callable[[], None]) -> Departure:
     """Find a way out of an occupied start, as far as there is time.
 
     Args:
         problem: with a `start_slack`.
-        field: the clearance of its map.
+        world: its map, prepared.
         occupied: the sentence on the start that is said without slack.
         check_time: called between the steps of the work; it raises OutOfTime where that has to end.
     """
     try:
-        return _found(problem, field, occupied, check_time)
+        return _found(problem, world, occupied, check_time)
     except OutOfTime:
         return Departure(None, f"{occupied[:-1]}; there was no time left to look for a way out of it.")
 
 
-def _found(problem: Problem, field: ClearanceField, occupied: str, check_time: Callable[[], None]) -> Departure:
+def _found(problem: Problem, world: World, occupied: str, check_time: Callable[[], None]) -> Departure:
+    field = world.field
     depth = _depth(problem, field)
     depth = depth if depth > ROUNDING else 0.0
     if depth > problem.start_slack + ROUNDING:
@@ -122,7 +165,7 @@ def _found(problem: Problem, field: ClearanceField, occupied: str, check_time: C
         found = sorted(_ways_out(problem, field, smaller, check_time), key=lambda path: _promise(path, problem, to_goal))
         for path in found[:MAX_AUDITED]:
             arcs = in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
-            if not judge_departure(arcs, problem, check_time).findings:
+            if not judge_departure(arcs, problem, world.obstacles, check_time).findings:
                 near = f"{metres(depth)} m too near to" if depth > 0 else "within a millimetre of"
                 return Departure(path, f"the start is {near} an obstacle, which is left within {path.length:.2f} m")
     return Departure(None, _no_way_out(problem, field, occupied, depth, check_time))

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from .answer import LEAST_IMPROVEMENT, AuditedPath, success_message
+from .answer import LEAST_IMPROVEMENT, AuditedPath, not_audited_message, success_message
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
-from .departure import find_departure
+from .departure import WholePlans, find_departure
 from .diagnosis import explain
 from .problem import Problem
 from .proof.background_proof import BackgroundProof
@@ -27,7 +27,7 @@ from .search.known_path import KnownPath
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
-from .settings import MIN_PLANNING_TIME, Settings
+from .settings import Settings
 from .world import World, prepare
 
 #: Maximum time between two reports of progress [s].
@@ -120,31 +120,31 @@ class _Call:
         """Prepare the world, look for reasons against a path, and search."""
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
-        field = self._prepared_world().field
+        world = self._prepared_world()
+        field = world.field
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
         if diagnosis := explain.before_search(self._problem, field, self._deadline.check):
             if diagnosis.status == Status.START_OCCUPIED and self._problem.start_slack > 0:
-                return self._leave_start(field, diagnosis.message)
+                return self._leave_start(world, diagnosis.message)
             return self._plan(diagnosis.status, diagnosis.message, self._root, location=diagnosis.location)
         if reaches_goal(self._problem.start, self._problem, rounding=SAME):
             self._time_to_found = self._elapsed
             return self._answer_with(Path.of_pose(self._problem.start), self._root, 0)
         return self._search(field)
 
-    def _leave_start(self, field: ClearanceField, occupied: str) -> Plan:
+    def _leave_start(self, world: World, occupied: str) -> Plan:
         """Return the plan from a start that is too near to an obstacle, or why there is none."""
-        problem = self._problem
-        departure = find_departure(problem, field, occupied, self._deadline.check)
+        departure = find_departure(self._problem, world, occupied, self._deadline.check)
         if self._deadline.cancelled:
             return self._cancelled(self._root, 0)
         if departure.path is None:
             return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
-        settings = replace(self._settings, planning_time=max(MIN_PLANNING_TIME, self._deadline.left))
-        found = plan(departure.rest(problem), settings, cancel=self._deadline.cancel, seed_path=self._seed_path,
-                     on_progress=lambda report: self._on_progress(departure.progress(report, problem, field)),
+        whole = WholePlans(self._problem, self._settings, departure, world, self._deadline)
+        found = plan(whole.rest, replace(self._settings, planning_time=whole.time_for_rest), cancel=self._deadline.cancel,
+                     seed_path=self._seed_path, on_progress=lambda report: self._on_progress(whole.progress(report)),
                      report_samples=self._report_samples)
-        return replace(departure.joined(found, problem, field), settings=self._settings, map_time=self._map_time)
+        return replace(whole.joined(found), map_time=self._map_time)
 
     def _is_cancelled(self) -> bool:
         self._deadline.poll()
@@ -325,9 +325,9 @@ class _Call:
 
     def _not_audited(self, path: Path, tree: Tree, samples: int) -> Plan:
         """Return the plan without a path where one was found, but too late for its audit."""
-        message = f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
         cancelled = self._deadline.cancelled
-        return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, message, tree, samples=samples, cancelled=cancelled)
+        return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, not_audited_message(path), tree, samples=samples,
+                          cancelled=cancelled)
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
         message = f"Cancelled before a first path: {self._drawn(samples, len(tree))}."

@@ -20,7 +20,7 @@ from .curves import dubins
 from .curves.angles import heading_error, position_error, wrap
 from .curves.path import Path
 from .deadline import Deadline, never
-from .departure import find_departure
+from .departure import WholePlans, find_departure
 from .planner import SAME, plan, with_seed
 from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
@@ -133,20 +133,20 @@ class _Call:
 
     def _leave_start(self, stops: list[_Stop]) -> Plan:
         """Return the plan from a start that is too near to an obstacle, or why there is none."""
-        problem = self._problem
         occupied = self._leg_plan(self._leg(*stops[:2]))
         if occupied.status != Status.START_OCCUPIED:
             return self._no_way(stops[1], occupied)
-        departure = find_departure(problem, self._world.field, occupied.message, self._clock.check)
+        departure = find_departure(self._problem, self._world, occupied.message, self._clock.check)
         if departure.path is None:
             return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
         passed = len(stops[0].waypoints)
-        rest = plan_through(departure.rest(problem), self._waypoints[passed:],
-                            replace(self._settings, planning_time=self._time(1.0)), cancel=self._cancel)
-        answer = departure.joined(rest, problem, self._world.field)
+        whole = WholePlans(self._problem, self._settings, departure, self._world, self._clock)
+        rest = plan_through(whole.rest, self._waypoints[passed:], replace(self._settings, planning_time=whole.time_for_rest),
+                            cancel=self._cancel)
+        answer = whole.joined(rest)
         later = len(answer.poses()) - len(rest.poses())
         indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
-        return replace(answer, waypoint_indices=indices, settings=self._settings, map_time=self._map_time)
+        return replace(answer, waypoint_indices=indices, map_time=self._map_time)
 
     def _without_room(self, stops: list[_Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""

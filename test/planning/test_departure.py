@@ -1,7 +1,9 @@
 """Starts that are too near to an obstacle: they are left by no way that comes nearer, and the audit judges just that."""
 
 import math
+import time
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,10 +21,14 @@ from dubins_rrt_ros.planning import (
     audit_path,
     plan,
     plan_through,
+    planner,
     prepare,
+    waypoints,
 )
+from dubins_rrt_ros.planning import departure as departures
 from dubins_rrt_ros.planning.audit.departure import start_room
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
+from dubins_rrt_ros.planning.deadline import OutOfTime
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.32, 0.36), (-0.48, 0.36), (-0.48, -0.36), (0.32, -0.36)], turning_radius=0.4)
@@ -148,6 +154,50 @@ def test_waypoints_are_reached_from_such_a_start_too():
     assert_comes_no_nearer(answer, 0.06)
     assert answer.waypoint_indices[0] == 0
     np.testing.assert_allclose(answer.poses()[list(answer.waypoint_indices[1:]), :2], [(5.0, 2.0), (6.0, 6.0)])
+
+
+LEAVING = Problem(ROOM, DISC, (0.25, 4.0, 0.0), GOAL, start_slack=0.06)
+
+
+@pytest.mark.parametrize("through", [(), [(5.0, 2.0)]], ids=["goal", "waypoint"])
+def test_the_times_are_those_since_the_request(through, monkeypatch):
+    def found_late(*given):
+        time.sleep(0.2)
+        return departures.find_departure(*given)
+    for module in (planner, waypoints):
+        monkeypatch.setattr(module, "find_departure", found_late)
+    reports = []
+    answer = plan_through(LEAVING, through, SETTINGS) if through else plan(LEAVING, SETTINGS, on_progress=reports.append)
+    answer.check()
+    assert 0.2 <= answer.time_to_found <= answer.time_to_first <= answer.planning_time
+    assert all(report.elapsed >= 0.2 for report in reports)
+
+
+def test_a_whole_path_is_audited_once(monkeypatch):
+    audited, snapshots = [], []
+
+    def audit(path, *given):
+        audited.append(path)
+        return audit_path(path, *given)
+
+    def look(report):
+        snapshots.extend([report.snapshot(), report.snapshot()])
+        assert tuple(report.tree().poses[0]) == LEAVING.start
+    monkeypatch.setattr(departures, "audit_path", audit)
+    answer = plan(LEAVING, SETTINGS, on_progress=look, report_samples=10)
+    assert answer.solved and len(snapshots) > 2 * len(audited) > 0
+    assert all(one != other for one, other in pairwise(audited))
+
+
+@pytest.mark.parametrize("through", [(), [(5.0, 2.0)]], ids=["goal", "waypoint"])
+def test_a_whole_path_that_there_is_no_time_to_audit_is_no_answer(through, monkeypatch):
+    def late(*_):
+        raise OutOfTime
+    monkeypatch.setattr(departures, "audit_path", late)
+    answer = plan_through(LEAVING, through, SETTINGS) if through else plan(LEAVING, SETTINGS)
+    answer.check()
+    assert answer.status == Status.TIMEOUT and not answer.start_too_near
+    assert "no time left to audit it" in answer.message
 
 
 def straight(start, length, word="LSL", turn=0.0):

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from ..problem import Problem
+from ..vehicle import Vehicle
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 from .sweep import CONTACT, MOST_POINTS, POINT, PRECISION, TOUCH, Arcs, PolygonSweep, clearance_findings, pose_gaps, refine
 
@@ -44,7 +45,8 @@ class Departure:
 def judge_clearance(arcs: Arcs, problem: Problem, obstacles: Obstacles | None, check_time: Callable[[], None]
                     ) -> tuple[list[str], float]:
     """Return what is wrong with the clearance along arcs in the order in which they are driven, and the least clearance [m]."""
-    departure = judge_departure(arcs, problem, check_time)
+    obstacles = obstacles or obstacles_of(problem.map, problem.allow_unknown)
+    departure = judge_departure(arcs, problem, obstacles, check_time)
     if departure.findings:
         return list(departure.findings), departure.least
     rest = _parts(arcs, departure.length)[1] if departure.length > 0 else arcs
@@ -52,41 +54,42 @@ def judge_clearance(arcs: Arcs, problem: Problem, obstacles: Obstacles | None, c
     return findings, min(least, departure.least)
 
 
-def judge_departure(arcs: Arcs, problem: Problem, check_time: Callable[[], None]) -> Departure:
+def judge_departure(arcs: Arcs, problem: Problem, obstacles: Obstacles, check_time: Callable[[], None]) -> Departure:
     """Judge the part of arcs up to the first pose at which the vehicle is clear."""
-    length = _length_until_clear(arcs, problem, check_time)
+    length = _length_until_clear(arcs, problem, obstacles, check_time)
     if length == 0:
         return Departure((), 0.0, math.inf)
     x, y = float(arcs.x[0]), float(arcs.y[0])
     if length == math.inf:
         return Departure((f"at its start ({x:.3f}, {y:.3f}) the vehicle is too near to an obstacle, and never clear",), 0.0, 0.0)
     leaving, _ = _parts(arcs, length)
-    room = start_room(problem)
+    room = start_room(problem, obstacles)
     if room < -problem.start_slack - CONTACT:
         return Departure((f"at ({x:.3f}, {y:.3f}) the start is {-room:.6f} m too near to an obstacle, more than start_slack "
                           f"{problem.start_slack:g} m",), length, 0.0)
-    least, place, decided = _least_of_smaller(leaving, problem, min(room, 0.0), check_time)
+    least, place, decided = _least_of_smaller(leaving, problem, obstacles, min(room, 0.0), check_time)
     findings = f"at ({place[0]:.3f}, {place[1]:.3f}) the vehicle comes nearer to an obstacle than at its start",
     return Departure(() if decided else findings, length, least)
 
 
-def start_room(problem: Problem) -> float:
+def start_room(problem: Problem, obstacles: Obstacles | None = None) -> float:
     """Return the room at the start [m]."""
     start, vehicle = np.array([problem.start]), problem.vehicle
-    gap = float(pose_gaps(start, problem)[0])
+    obstacles = obstacles or obstacles_of(problem.map, problem.allow_unknown)
+    gap = float(pose_gaps(start, problem, obstacles)[0])
     if not vehicle.footprint or gap > 0:
         return gap
-    obstacles = _obstacles_near(problem, start[:, 0] + 1j * start[:, 1], 0.0)
+    near = _obstacles_near(vehicle, obstacles, start[:, 0] + 1j * start[:, 1], 0.0)
     low, high = 0.0, vehicle.circumscribed_radius  # it is between these
     for _ in range(HALVINGS):
         depth = (low + high) / 2
         corners = _smaller(vehicle.footprint, depth)
-        touches = bool(corners) and PolygonSweep(corners, obstacles).clearance(*start.T)[0] <= 0
+        touches = bool(corners) and PolygonSweep(corners, near).clearance(*start.T)[0] <= 0
         low, high = (depth, high) if touches else (low, depth)
     return -high
 
 
-def _length_until_clear(arcs: Arcs, problem: Problem, check_time: Callable[[], None]) -> float:
+def _length_until_clear(arcs: Arcs, problem: Problem, obstacles: Obstacles, check_time: Callable[[], None]) -> float:
     """Return the length up to the first pose that is clear [m]; infinite where there is none."""
     vehicle = problem.vehicle
     enough = TOUCH if vehicle.footprint else max(POINT - vehicle.robot_radius, 0.0) - CONTACT
@@ -98,13 +101,13 @@ def _length_until_clear(arcs: Arcs, problem: Problem, check_time: Callable[[], N
     for first in range(0, len(index), AT_ONCE):
         check_time()
         some = slice(first, first + AT_ONCE)
-        gaps = pose_gaps(np.column_stack(arcs.at(index[some], begin[some])), problem)
+        gaps = pose_gaps(np.column_stack(arcs.at(index[some], begin[some])), problem, obstacles)
         if (gaps >= enough).any():
             return float(along[some][np.argmax(gaps >= enough)])
     return math.inf
 
 
-def _least_of_smaller(arcs: Arcs, problem: Problem, room: float, check_time: Callable[[], None]
+def _least_of_smaller(arcs: Arcs, problem: Problem, obstacles: Obstacles, room: float, check_time: Callable[[], None]
                       ) -> tuple[float, tuple[float, float], bool]:
     """Sweep a vehicle along arcs that is smaller by what it overlaps at the start.
 
@@ -119,15 +122,16 @@ def _least_of_smaller(arcs: Arcs, problem: Problem, room: float, check_time: Cal
         return 0.0, (float(arcs.x[0]), float(arcs.y[0])), True
     spacing = max(vehicle.circumscribed_radius, PRECISION, float(arcs.length.sum()) / MOST_POINTS)
     x, y, _ = arcs.at(*arcs.pieces(spacing)[:2])
-    least, place, decided = refine(arcs, PolygonSweep(corners, _obstacles_near(problem, x + 1j * y, spacing)), required,
-                                         check_time)
+    near = _obstacles_near(vehicle, obstacles, x + 1j * y, spacing)
+    least, place, decided = refine(arcs, PolygonSweep(corners, near), required, check_time)
     return 0.0 if vehicle.footprint else least, place, decided and least >= required - CONTACT
 
 
-def _obstacles_near(problem: Problem, points: np.ndarray, spacing: float) -> PathsideSquares | PolygonObstacles:
+def _obstacles_near(vehicle: Vehicle, obstacles: Obstacles, points: np.ndarray, spacing: float
+                    ) -> PathsideSquares | PolygonObstacles:
     """Return the obstacles around the vehicle at points along a path, and as far between them."""
-    radius = problem.vehicle.circumscribed_radius
-    return obstacles_of(problem.map, problem.allow_unknown).near_path(points, radius + spacing, radius + spacing)
+    radius = vehicle.circumscribed_radius
+    return obstacles.near_path(points, radius + spacing, radius + spacing)
 
 
 def _smaller(footprint: tuple[tuple[float, float], ...], depth: float) -> tuple[tuple[float, float], ...]:

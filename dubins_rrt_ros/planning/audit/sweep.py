@@ -284,9 +284,9 @@ class PolygonSweep:
         return np.nonzero(kept)[0], parts[kept]
 
 
-def pose_gaps(poses: np.ndarray, problem: Problem) -> np.ndarray:
+def pose_gaps(poses: np.ndarray, problem: Problem, obstacles: Obstacles | None = None) -> np.ndarray:
     """Return the gaps between vehicle and obstacles at (n, 3) poses [m]; negative, or 0 for polygons, where they meet."""
-    obstacles, vehicle = obstacles_of(problem.map, problem.allow_unknown), problem.vehicle
+    obstacles, vehicle = obstacles or obstacles_of(problem.map, problem.allow_unknown), problem.vehicle
     x, y, theta = np.asarray(poses, dtype=float).T
     if not vehicle.footprint:
         return DiscSweep(obstacles).clearance(x, y, theta) - vehicle.robot_radius
