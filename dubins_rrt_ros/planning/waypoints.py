@@ -15,13 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._kernels import COMPILED
+from .answer import not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
 from .curves.angles import heading_error, position_error, wrap
 from .curves.path import Path
-from .deadline import Deadline, never
-from .departure import WholePlans, find_departure
-from .planner import SAME, plan, with_seed
+from .deadline import Deadline, OutOfTime, never
+from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
+from .planner import AUDIT_RESERVE, SAME, plan, with_seed
 from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
 from .search.cost import Objective
@@ -95,6 +96,7 @@ class _Call:
         self._objective = Objective.of(self._problem, settings, world.field)
         self._map_time = self._clock.elapsed
         self._clock.restart()
+        self._clock.reserve = min(AUDIT_SHARE * settings.planning_time, MOST_FOR_AUDIT)
         self._samples = 0
         self._found_by = ""
         self._explored: set[int] = set()
@@ -122,7 +124,7 @@ class _Call:
                                        first.cost))
         if self._settings.planner == "rrt" or self._clock.is_over:
             return first
-        return self._joined(stops, self._turned(stops, self._planned(paths)))
+        return self._joined(stops, self._turned(stops, self._planned(paths)), first)
 
     def _single_leg(self, stops: list[_Stop]) -> Plan:
         """Return the plan where all waypoints are at the start or at the goal."""
@@ -226,8 +228,8 @@ class _Call:
         return plan(problem, settings, cancel=self._cancel)
 
     def _time(self, share: float) -> float:
-        """Return a share of the time that is left, as a limit [s]."""
-        return max(MIN_PLANNING_TIME, share * self._clock.left)
+        """Return a share of the time that is left for the legs, as a limit [s]."""
+        return max(MIN_PLANNING_TIME, share * (self._clock.left - self._clock.reserve))
 
     # Legs
 
@@ -283,12 +285,18 @@ class _Call:
 
     # Answers
 
-    def _joined(self, stops: list[_Stop], paths: list[Path]) -> Plan:
-        """Return the plan with the path of all legs, audited as a whole."""
+    def _joined(self, stops: list[_Stop], paths: list[Path], before: Plan | None = None) -> Plan:
+        """Return the plan with the path of all legs, audited as a whole; without time for that, the path before, if any."""
         path = Path.of_curves(self._problem.start, paths[-1].end, [curve for leg in paths for curve in leg.curves])
-        audit = audit_path(path, self._problem, self._world.obstacles)
-        audit = Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
         tree = Tree.of_path(path, self._objective.curve_costs(path))
+        try:
+            audit = self._audit(path)
+        except OutOfTime:
+            cancelled = self._clock.cancelled
+            if before and before.path:
+                return replace(before, cancelled=cancelled, planning_time=self._clock.elapsed)
+            return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, not_audited_message(path), tree,
+                              samples=self._samples, cancelled=cancelled)
         if not audit.ok:
             message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
             return self._plan(Status.UNKNOWN, message, tree, audit=audit)
@@ -302,6 +310,13 @@ class _Call:
                             cost=float(tree.costs[-1]), cost_lower_bound=bound, found_by=self._found_by,
                             cancelled=self._clock.cancelled)
         return replace(answer, waypoint_indices=tuple(_indices(stops, paths, answer.poses())))
+
+    def _audit(self, path: Path) -> Audit:
+        """Audit the path of all legs, and keep as much time for the next audit."""
+        began = self._clock.elapsed
+        audit = audit_path(path, self._problem, self._world.obstacles, self._clock.check)
+        self._clock.reserve = AUDIT_RESERVE * (self._clock.elapsed - began)
+        return Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
 
     def _lower_bound(self) -> float:
         """Return a length that no path over the waypoints falls below [m]."""
@@ -335,9 +350,8 @@ class _Call:
         return self._plan(status, why, root, location=found.location)
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
-        first = self._time_to_first
-        return Plan(status, message, self._problem, self._settings, tree, time_to_first=first, time_to_found=first,
-                    planning_time=self._clock.elapsed, map_time=self._map_time, **more)
+        return Plan(status, message, self._problem, self._settings, tree, time_to_first=self._time_to_first,
+                    time_to_found=self._time_to_first, planning_time=self._clock.elapsed, map_time=self._map_time, **more)
 
 
 def _stops(problem: Problem, waypoints: Sequence[Waypoint]) -> Iterator[_Stop]:

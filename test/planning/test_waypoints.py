@@ -3,16 +3,29 @@
 import math
 import re
 from itertools import pairwise
+from threading import Event
 
 import numpy as np
 import pytest
 from support.cases import needs_compiled, scaled
 from support.yard import GOAL, IN_THE_BOX, IN_THE_CHAMBER, START, yard
 
-from dubins_rrt_ros.planning import GridMap, InvalidPose, Problem, Settings, Status, Vehicle, plan, plan_through, prepare
+from dubins_rrt_ros.planning import (
+    GridMap,
+    InvalidPose,
+    Problem,
+    Settings,
+    Status,
+    Vehicle,
+    plan,
+    plan_through,
+    prepare,
+    waypoints,
+)
 from dubins_rrt_ros.planning.audit import audit_path
 from dubins_rrt_ros.planning.audit.verdict import passing_findings
 from dubins_rrt_ros.planning.curves import dubins
+from dubins_rrt_ros.planning.deadline import OutOfTime
 from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
@@ -176,6 +189,34 @@ def test_the_first_path_is_reported(world):
     assert reports[0].improved
     assert first.audit.ok
     assert first.length >= answer.length - 1e-6
+
+
+@pytest.mark.parametrize(("in_time", "status"), [(0, Status.TIMEOUT), (1, Status.NONE)])
+def test_a_path_that_there_is_no_time_to_audit_is_no_answer_and_the_one_before_is(world, in_time, status, monkeypatch):
+    audited = []
+
+    def audit(path, *given):
+        if len(audited) == in_time:
+            raise OutOfTime
+        audited.append(path)
+        return audit_path(path, *given)
+    monkeypatch.setattr(waypoints, "audit_path", audit)
+    answer = through(world, BELOW, ABOVE)
+    assert (answer.status, answer.path) == (status, audited[0] if audited else None)
+    assert status == Status.NONE or "no time left to audit it" in answer.message
+
+
+def test_a_request_that_is_cancelled_during_its_first_audit_is_cancelled(world, monkeypatch):
+    cancelled = Event()
+
+    def audit(path, problem, obstacles, check_time):
+        cancelled.set()
+        while True:
+            check_time()
+    monkeypatch.setattr(waypoints, "audit_path", audit)
+    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, cancel=cancelled.is_set)
+    answer.check()
+    assert answer.status == Status.CANCELLED and answer.path is None
 
 
 def test_the_audit_finds_a_waypoint_that_is_not_passed(world):
