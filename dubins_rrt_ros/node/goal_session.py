@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.node import Node
 from rclpy.timer import Timer
 
-from dubins_rrt_ros.planning import Audit, Plan, Pose, Status
+from dubins_rrt_ros.planning import Audit, Path, Plan, Pose, Status
 from dubins_rrt_ros.planning.curves.angles import heading_error, position_error
 from dubins_rrt_ros.planning.curves.progress import PathProgress
 from dubins_rrt_ros.planning.result import waypoint_arc_lengths
@@ -129,7 +129,7 @@ class GoalSession:
         self._retry("start")
 
     def map_came(self) -> None:
-        """Try again what the newest map, which is prepared, can cure; else check the published path against it."""
+        """Try again what a map that is prepared can cure; else check the published path against it."""
         self._retry("map")
         self._check_path()
 
@@ -329,11 +329,13 @@ class GoalSession:
                 or self._progress.distance > plan.problem.vehicle.turning_radius)
 
     def _check_path(self) -> None:
-        """See whether what is left of the published path is free on the newest map; it is planned again, whether or not."""
+        """See whether what is left of the published path is free on a newer map; it is planned again, whether or not."""
+        self._path_check.begin(self._ahead, lambda: self._awaited_request is None, self._on_checked)
+
+    def _ahead(self) -> Path | None:
+        """Return what is left of the published path, None where there is none or the goal is reached."""
         self._follow_frame()
-        progress = self._progress
-        if progress is not None and not self._is_reached:
-            self._path_check.begin(lambda: progress.ahead, lambda: self._awaited_request is None, self._on_checked)
+        return None if self._progress is None or self._is_reached else self._progress.ahead
 
     def _on_checked(self, verdict: Audit) -> None:
         message = f"The map changed, and the published path is not free on it: {'; '.join(verdict.findings)}. It is"

@@ -43,12 +43,13 @@ class Maps:
     Attributes:
         map: what is planned on; None until there is one.
         grid: the same as a grid.
+        prepared: the newest world that is prepared, which may be of an older map; None until there is one.
         refusal: a sentence, with a space in front, that says why the last map was refused; "" where it was taken.
 
     Args:
         node, parameters, queue: the node's.
         on_news: called in the executor's thread when a map was taken or refused.
-        on_prepared: called there when the newest map is prepared.
+        on_prepared: called there when a map is prepared, even if a newer one has come meanwhile.
 
     Raises:
         MapError: the parameter map_file names no map that can be used.
@@ -61,13 +62,13 @@ class Maps:
         self._frame = self._options.global_frame
         self.map: Map | None = None
         self.grid: GridMap | None = None
+        self.prepared: World | None = None
         self.refusal = ""
         self._came_by_topic = False
         self._worker = Worker("maps")
         self._world: futures.Future[World] = futures.Future()  # of the newest map
         self._world_is_of: tuple[Map, float, bool] | None = None  # map, required clearance and allow_unknown
         self._world_is_wanted = False  # by a request, whatever map comes next
-        self._last_world: World | None = None  # that was prepared; the worker's own
         self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED) if self._options.map_file else None
         if self._options.map_file:
             try:
@@ -87,11 +88,6 @@ class Maps:
         return self._parameters.read().node
 
     # Worlds
-
-    @property
-    def is_prepared(self) -> bool:
-        """True if requests can be planned on the newest map without delay."""
-        return self.map is not None and self._newest_world().done()
 
     def world_for_request(self) -> "futures.Future[World]":
         """Return the world of the newest map, as it will be: for this request it is prepared even if another map comes first."""
@@ -123,19 +119,17 @@ class Maps:
             return None
         try:
             world_map.id  # noqa: B018 - takes long for a large map, and is kept
-            # The last one, from which what did not change is taken over, is not kept any longer.
-            last, self._last_world = self._last_world, None
-            self._last_world = prepare(world_map, vehicle, allow_unknown, last)
+            self.prepared = prepare(world_map, vehicle, allow_unknown, self.prepared)
         except Exception as error:
             world.set_exception(error)  # which a request reports
             raise
-        world.set_result(self._last_world)
-        return self._last_world
+        world.set_result(self.prepared)
+        return self.prepared
 
     def _end_preparation(self, outcome: World | Exception | None) -> None:
         if isinstance(outcome, Exception):
             raise outcome
-        if outcome is not None and self._world.done() and outcome is self._world.result():
+        if outcome is not None:
             outline = self._parameters.read().vehicle.footprint
             vehicle = f", for {summary(outline)}" if outline else ""
             self._node.get_logger().info(f"The map is ready, id {outcome.map.id}{vehicle}")

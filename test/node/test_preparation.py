@@ -28,17 +28,23 @@ class Keeper:
 
     Attributes:
         made: the names of the maps that were prepared, each with that of the map that it was prepared from.
+        turns: where it is set, each preparation waits for one.
     """
 
     def __init__(self, executor, node):
         self._executor = executor
-        self._maps = Maps(node, Parameters(node), ExecutorQueue(node), lambda: None, lambda: self._heard.append(self._name))
+        self._maps = Maps(node, Parameters(node), ExecutorQueue(node), lambda: None, self._hear)
         self._name, self._heard = "", []
         self.worker = self._maps._worker
         self.made = []
+        self.turns = None
+
+    def _hear(self):
+        self._heard.append(self._maps.prepared.map.name)
 
     def prepare(self, map, vehicle, allow_unknown, previous):
         self.made.append((map.name, previous and previous.map.name))
+        assert self.turns is None or self.turns.acquire(timeout=SOON)
         return prepare(map, vehicle, allow_unknown, previous)
 
     def take(self, name):
@@ -52,10 +58,17 @@ class Keeper:
 
     def wait(self):
         """Until the newest is prepared and that has been heard of."""
+        self.wait_for_ready(self._name)
+
+    def wait_for(self, condition):
         end = time.monotonic() + SOON
-        while self._name not in self._heard:
-            assert time.monotonic() < end, f"map {self._name} is not prepared"
+        while not condition():
+            assert time.monotonic() < end, f"it did not come; heard of {self._heard}"
             self._executor.spin_once(timeout_sec=0.1)
+
+    def wait_for_ready(self, name):
+        """Until a map is prepared and that has been heard of."""
+        self.wait_for(lambda: name in self._heard)
 
     @contextmanager
     def busy(self):
@@ -97,6 +110,18 @@ def test_a_map_is_prepared_from_the_last_that_was_where_those_between_were_not(k
             keeper.take(name)
     keeper.wait()
     assert keeper.made == [("a", None), ("d", "a")]
+
+
+def test_maps_that_come_faster_than_they_are_prepared_are_told_as_they_get_ready(keeper):
+    keeper.turns = threading.Semaphore(0)
+    keeper.take("a")
+    for before, name in zip("abc", "bcd", strict=True):
+        keeper.wait_for(lambda before=before: before in dict(keeper.made))
+        keeper.take(name)  # while the one before is being prepared
+        keeper.turns.release()
+        keeper.wait_for_ready(before)
+    keeper.turns.release()
+    keeper.wait()
 
 
 def test_old_maps_are_let_go(keeper):
