@@ -100,7 +100,7 @@ class _Call:
         self._samples = 0
         self._found_by = ""
         self._explored: set[int] = set()
-        self._rng = np.random.default_rng((settings.seed, 4))  # apart from those of the searches
+        self._rng = np.random.default_rng((settings.seed, 4))  # the numbers that Smoother.simplify draws too, no others
         self._failures: dict[int, Plan] = {}  # by the id of the leg
         self._time_to_first: float | None = None
 

@@ -66,7 +66,7 @@ class Corridors:
         """
         self._problem, self._objective, self._interrupted = problem, objective, interrupted
         self._checker, self._edge_cost = objective.field.collision_checker(problem.vehicle), objective.edge_cost()
-        self._rng = np.random.default_rng((seed, 5))  # apart from those of the samples, of hybrid A* and of the smoothing
+        self._rng = np.random.default_rng((seed, 5))  # the numbers that merge_short_arcs draws too, no others
         self._squares = Squares(problem, objective.field)
         self._sources: list[Detours] = [SaddleDetours(problem, self._squares, objective, from_start, to_goal, limit),
                                         ClosedPlaces(self._squares, self._rng)]  # the next one to ask is the first

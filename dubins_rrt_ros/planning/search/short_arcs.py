@@ -50,7 +50,7 @@ def merge_short_arcs(path: Path, objective: Objective, seed: int, interrupted: C
     """
     if not LEAST_RADIUS <= path.radius < math.inf:
         return path
-    rng = np.random.default_rng((seed, 5))  # apart from those of the search and of smoothing
+    rng = np.random.default_rng((seed, 5))  # the numbers that Corridors draws too, no others
     return _Merger(path, objective, rng, interrupted).merge(_without_empty_curves(path))
 
 
