@@ -117,6 +117,16 @@ def test_the_gap_of_the_maze_is_closed(maze):
 
 
 @needs_compiled
+def test_a_proof_that_is_interrupted_as_it_begins_has_fewer_levels_and_holds(maze):
+    result = plan(maze, Settings(seed=1, samples=300))
+    for looks in (0, 2):
+        proof = LengthProof(maze, maze.world.field, result.path, interrupted=rounds(looks))
+        assert len(proof._layers) == looks + 2  # start, levels and goal
+        proof.run(rounds(20), gap=0.015)
+        assert 0 < proof.bound <= result.length
+
+
+@needs_compiled
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_bound_is_above_a_path_on_random_problems(seed):

@@ -30,7 +30,7 @@ class BackgroundProof:
     def _run(self, problem: Problem, field: ClearanceField, path: Path) -> None:
         if self._is_interrupted():
             return
-        self._proof = LengthProof(problem, field, path)
+        self._proof = LengthProof(problem, field, path, interrupted=self._is_interrupted)
         self.follow(self._length)
         self._proof.run(self._is_interrupted, self._gap)
 

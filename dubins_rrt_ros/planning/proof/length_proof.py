@@ -8,8 +8,8 @@ holds for all paths, whichever way round they lead. To split boxes of places and
 """
 
 import math
-from collections.abc import Callable
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -54,12 +54,14 @@ class LengthProof:
         length: length of the best path that is known [m]; to be lowered when a shorter one is found.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, path: Path, limit: float = math.inf):
+    def __init__(self, problem: Problem, field: ClearanceField, path: Path, limit: float = math.inf,
+                 interrupted: Callable[[], bool] = never):
         """Prepare the proof, in milliseconds to tenths of a second.
 
         Args:
             path: a path of the problem, by whose contacts the first levels are chosen.
             limit: `length` will be at most this; by default the length of the path [m].
+            interrupted: asked before each level; True leaves the other levels out, with which the bound would rise further.
         """
         self.length = path.length
         self._problem, self._field = problem, field
@@ -67,12 +69,12 @@ class LengthProof:
         self._sets = LevelSets(problem, field)
         self.bound = min(self._sets.bound, self.length)
         self._limit_of_sets = limit if limit < math.inf else self.length
-        self._interrupted = never
-        self._layers = [Layer.of_pose(problem.start, 0.0, 0.0), *map(self._layer_at, self._contacts(path)),
+        self._interrupted = interrupted
+        self._layers = [Layer.of_pose(problem.start, 0.0, 0.0), *self._layers_at(self._contacts(path)),
                         Layer.of_pose(problem.goal, problem.goal_tolerance_xy, min(problem.yaw_tolerance, math.pi))]
         self._is_stale = True
         for _ in range(STRING_ROUNDS):
-            if not self._add_levels_along_string():
+            if interrupted() or not self._add_levels_along_string():
                 break
 
     def run(self, interrupted: Callable[[], bool], gap: float = 0.0) -> None:
@@ -98,6 +100,10 @@ class LengthProof:
 
     def _layer_at(self, level: float) -> Layer:
         return Layer(self._sets, level, self._limit_of_sets)
+
+    def _layers_at(self, levels: Iterable[float]) -> Iterator[Layer]:
+        """Return the layers at levels, one after the other, as far as there is time for them."""
+        return map(self._layer_at, takewhile(lambda _: not self._interrupted(), levels))
 
     def _contacts(self, path: Path) -> list[float]:
         """Return the levels where the path touches obstacles, those where it has least room first, so far as they are apart."""
@@ -125,7 +131,7 @@ class LengthProof:
             if (room < 0.5 * required).mean() * math.dist(point, other) > STRING_DEPTH * self._radius:
                 margin = STRING_SPACING * self._radius
                 added.append(level + min(max(shares[room.argmin()] * rise, margin), rise - margin))
-        self._layers[1:-1] = sorted([*self._layers[1:-1], *map(self._layer_at, added)], key=lambda layer: layer.level)
+        self._layers[1:-1] = sorted([*self._layers[1:-1], *self._layers_at(added)], key=lambda layer: layer.level)
         return bool(added)
 
     def _shortest_string(self) -> list[np.ndarray]:
