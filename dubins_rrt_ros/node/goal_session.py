@@ -9,10 +9,11 @@ from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.node import Node
 from rclpy.timer import Timer
 
-from dubins_rrt_ros.planning import Audit, Path, Plan, Pose, Status
+from dubins_rrt_ros.planning import Audit, Path, Plan, Pose, Status, World
 from dubins_rrt_ros.planning.curves.angles import heading_error, position_error
 from dubins_rrt_ros.planning.curves.progress import PathProgress
 from dubins_rrt_ros.planning.result import waypoint_arc_lengths
+from dubins_rrt_ros.planning.search.cost import Objective
 
 from .conversions import are_equal, has_rotation
 from .dispatcher import Dispatcher
@@ -322,10 +323,10 @@ class GoalSession:
         """
         if request.purpose is not _Purpose.REPLAN or request.has_path or self._progress is None:
             return True
-        if plan is None or plan.path is None:
+        if plan is None or plan.cost is None:
             return False
         gain = self._parameters.read().node.replan_gain
-        return (plan.path.length < (1 - gain) * self._progress.left
+        return (plan.cost < (1 - gain) * _cost_of_rest(self._progress, plan)
                 or self._progress.distance > plan.problem.vehicle.turning_radius)
 
     def _check_path(self) -> None:
@@ -369,3 +370,10 @@ def _restart(timer, interval: float) -> None:
     """Have a timer call back after this time [s], and again and again."""
     timer.timer_period_ns = round(interval * 1e9)
     timer.reset()
+
+
+def _cost_of_rest(progress: PathProgress, plan: Plan) -> float:
+    """Return what the rest of a path costs on the map, and by the settings, of a plan [m]: the length where that is minimised."""
+    assert isinstance(plan.problem.world, World)
+    objective = Objective.of(plan.problem, plan.settings, plan.problem.world.field)
+    return progress.left if objective.is_length else objective.path_cost(progress.ahead)

@@ -134,15 +134,16 @@ class PathServer:
 
     def _request(self, request: Any, goals: list[PoseStamped]) -> PlanRequest | RefusedRequest:
         try:
-            return self._dispatcher.request(self._readiness.require_map(), partial(self._locate, request, goals))
+            locate = partial(self._locate, request, goals, self._dispatcher.any_goal_heading)
+            return self._dispatcher.request(self._readiness.require_map(), locate)
         except Exception as error:
             return RefusedRequest(error)
 
-    def _locate(self, request: Any, goals: list[PoseStamped]) -> Route:
+    def _locate(self, request: Any, goals: list[PoseStamped], any_heading: bool) -> Route:
         # In a worker's thread.
         start = self._frames.pose("start", request.start) if request.use_start else self._readiness.require_start()
         waypoints = tuple(self._frames.pose(f"waypoint {n}", pose) for n, pose in enumerate(goals[:-1], 1))
-        return Route(start, self._frames.pose("goal", goals[-1]), waypoints)
+        return Route(start, self._frames.pose("goal", goals[-1], any_heading), waypoints)
 
     def _end(self, answer: "_Answer", plan_id: int, outcome: Outcome) -> None:
         self._outputs.report(outcome, request="action", plan_id=plan_id, revision=1, map_id=self._readiness.map_id,

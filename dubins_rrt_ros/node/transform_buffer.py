@@ -99,6 +99,11 @@ class TransformBuffer:
                 stamp = min(newest, default=None)
             return self._joined(down, stamp).inverse.after(self._joined(up, stamp)), stamp
 
+    def forget_moving(self) -> None:
+        """Forget all frames that move: their times are of no use once the clock was set back."""
+        with self._lock:
+            self._frames = {name: frame for name, frame in self._frames.items() if frame.is_static}
+
     def _joined(self, chain: list[str], stamp: int | None) -> Rigid:
         """Return the pose of the first frame of a chain in the parent of its last."""
         pose = IDENTITY

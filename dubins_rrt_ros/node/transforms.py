@@ -1,8 +1,11 @@
 """Transforms as they come by topic: kept by tf2_ros where it is installed, else by a buffer of our own, if the messages are."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
+from rclpy.clock import JumpHandle, JumpThreshold
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
@@ -39,12 +42,19 @@ def transforms(node: Node) -> Transforms | None:
     return None if TFMessage is None else OwnTransforms(node)
 
 
+def _on_jump_back(node: Node, forget: Callable[[], None]) -> JumpHandle:
+    """Have this called when the node's clock is set back, as a simulation does that begins again, while the handle is kept."""
+    threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
+    return node.get_clock().create_jump_callback(threshold, post_callback=lambda jump: forget())
+
+
 class Tf2Transforms:
     """Keeps transforms by tf2_ros."""
 
     def __init__(self, node: Node):
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer, node)
+        self._jumps = _on_jump_back(node, self._buffer.clear)  # which keeps the static ones
 
     def lookup(self, target: str, source: str, stamp: int | None) -> tuple[Rigid, int | None]:
         """Return the pose of a frame in another at a time."""
@@ -64,6 +74,7 @@ class OwnTransforms:
 
     def __init__(self, node: Node):
         self._buffer = TransformBuffer()
+        self._jumps = _on_jump_back(node, self._buffer.forget_moving)
         node.create_subscription(TFMessage, "/tf", partial(self._take, is_static=False), TF)
         node.create_subscription(TFMessage, "/tf_static", partial(self._take, is_static=True), TF_STATIC)
 

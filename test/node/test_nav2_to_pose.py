@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("nav2_msgs", reason="nav2_msgs is not here; .ci/messages builds it")
 
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
 from nav2_msgs.action import ComputePathToPose
 from nav2_msgs_shapes.action import LaterToPose, OlderToPose
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -64,6 +64,20 @@ def test_a_goal_gets_a_path_which_is_published_too(action):
     told = client.status_of(plan_id)
     assert (told["request"], told["error_name"], told["message"]) == ("action", "NONE", result.error_msg)
     assert told["stamp"] == f"{result.path.header.stamp.sec}.{result.path.header.stamp.nanosec:09}"
+
+
+def test_a_goal_without_a_rotation_is_reached_with_any_heading_where_the_parameter_allows_it(action):
+    goal = stamped(GOAL)
+    goal.pose.orientation = Quaternion(w=0.0)
+    asked = ComputePathToPose.Goal(start=stamped(START), goal=goal, use_start=True)
+    assert action.result(action.accepted(asked))[1].error_code == 200
+    action.client.set_parameters(any_goal_heading=True)
+    try:
+        status, result = action.result(action.accepted(asked))
+    finally:
+        action.client.set_parameters(any_goal_heading=False)
+    assert (status, result.error_code) == (SUCCEEDED, 0)
+    assert poses_of(result.path)[-1, :2] == pytest.approx(GOAL[:2], abs=1e-9)
 
 
 @pytest.mark.parametrize(("code", "start", "goal", "parameters", "words"), ERRORS, ids=[str(row[0]) for row in ERRORS])

@@ -100,6 +100,17 @@ def test_a_frame_that_never_moves_is_known_at_all_times(buffer):
         assert buffer.lookup("map", "dock", stamp)[0] == shifted(1)
 
 
+def test_once_the_clock_was_set_back_only_frames_that_never_move_are_known(buffer):
+    buffer.add("map", "dock", 500 * SECOND, shifted(1), is_static=True)
+    buffer.add("map", "base", 500 * SECOND, shifted(5), is_static=False)
+    buffer.forget_moving()
+    assert buffer.lookup("map", "dock")[0] == shifted(1)
+    with pytest.raises(TransformUnknown, match="there is no frame 'base' yet"):
+        buffer.lookup("map", "base")
+    buffer.add("map", "base", SECOND, shifted(2), is_static=False)
+    assert buffer.lookup("map", "base") == (shifted(2), SECOND)
+
+
 def test_a_frame_that_gets_another_parent_is_known_there_alone(buffer):
     buffer.add("map", "base", SECOND, shifted(1), is_static=False)
     buffer.add("odom", "base", 2 * SECOND, shifted(2), is_static=False)

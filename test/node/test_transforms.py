@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.srv import GetMap, GetPlan
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from support.harness import poses_of, stamped, values_of
 from support.yard import GOAL, START
@@ -137,6 +138,20 @@ def test_one_that_does_not_come_is_told_and_the_goal_is_planned_when_it_comes(dr
     client.wait_for(planned, "the path")
 
 
+def test_frames_that_are_not_known_at_one_time_yet_are_waited_for(drive):
+    client, tf, _ = drive(transform_tolerance=0.1)
+    follow(client, tf)
+    tf.send("map", "odom", (0.0, 0.0, 0.0), stamp=tf.now(ago=5.0))
+    tf.send("odom", "base", START)
+    client.call(GetMap, "get_map")
+    told = goal_told(client, tf.goal(GOAL, "map"), error_name="TF_ERROR")
+    client.wait_for(lambda: client.statuses[-1].message.startswith("Waiting for a transform: "), "what it waits for")
+    now = tf.now()
+    for parent, child, pose in (("map", "odom", (0.0, 0.0, 0.0)), ("odom", "base", START)):
+        tf.send(parent, child, pose, stamp=now)
+    client.status_of(int(told["plan_id"]), error_name="NONE")
+
+
 def test_a_transform_of_the_vehicle_that_is_too_old_is_an_error_with_its_age(drive):
     client, tf, _ = drive(transform_tolerance=0.1)
     follow(client, tf)
@@ -191,3 +206,21 @@ def test_a_start_in_another_frame_waits_for_its_transform_too(drive):
     goal_told(client, tf.goal(GOAL, "map"), samples="300")
     client.wait_for(lambda: client.paths, "the path")
     assert poses_of(client.paths[-1])[0] == pytest.approx((1.5, 5.0, 0.0), abs=1e-9)
+
+
+def test_when_the_clock_is_set_back_what_was_heard_before_is_forgotten(drive):
+    """As a simulation that begins again does."""
+    client, tf, _ = drive(use_sim_time=True)
+    clock = client.node.create_publisher(Clock, "/clock", 10)
+    client.wait_for(clock.get_subscription_count, "the planner to hear the clock")
+    follow(client, tf)
+    for seconds, start in ((100, (1.5, 2.0, 0.0)), (5, START)):
+        clock.publish(Clock(clock=Time(sec=seconds)))
+        client.call(GetMap, "get_map")
+        tf.send("map", "base", start, stamp=seconds * 10**9)
+        client.call(GetMap, "get_map")
+        client.paths.clear()
+        goal_told(client, tf.goal(GOAL, "map"), samples="300")
+        client.wait_for(lambda: client.paths, "the path")
+        assert poses_of(client.paths[-1])[0] == pytest.approx(start, abs=1e-9)
+        client.call(Trigger, "cancel")
