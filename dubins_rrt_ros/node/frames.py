@@ -100,7 +100,7 @@ class Frames:
         try:
             return self._transforms.lookup(self._frame, frame, stamp)
         except TransformUnknown as error:
-            if error.is_final:
+            if error.is_final and stamp is not None:  # the latest may always come
                 raise self._refusal(name, frame, f"{error}; send it sooner, or") from None
             raise self._not_yet(name, frame, str(error)) from None
 
