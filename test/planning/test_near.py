@@ -14,7 +14,7 @@ from dubins_rrt_ros.planning._kernels.near import takes_half_circle
 from dubins_rrt_ros.planning._kernels.rrt import RrtKernel
 from dubins_rrt_ros.planning._kernels.tree import SearchTree
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.search.rrt import MOST_NEAR, NEAR_FACTOR
+from dubins_rrt_ros.planning.search.growing_tree import MOST_NEAR, NEAR_FACTOR
 
 GAIN = 1e-6
 NEED = 0.2
