@@ -2,6 +2,7 @@
 
 import math
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -212,6 +213,18 @@ def test_the_gain_is_a_parameter(drive):
     assert len(client.paths) == shown
     client.set_parameters(replan_gain=0.01)
     client.wait_for(lambda: client.paths[shown:], "the shorter path")
+
+
+def test_a_path_that_costs_less_replaces_a_shorter_one(drive):
+    drive = drive(DETOUR, replan_rate=10.0)
+    client = drive.client
+    short = float(drive.go(GOAL, samples="300")["path_length"])
+    drive.all_is_said()
+    shown = len(client.paths)
+    client.set_parameters(preferred_clearance=1.0, clearance_weight=5.0)
+    client.wait_for(lambda: client.paths[shown:], "the path with more room")
+    wide = poses_of(client.paths[-1])
+    assert sum(math.dist(a[:2], b[:2]) for a, b in pairwise(wide)) > short
 
 
 def test_only_the_part_of_the_path_ahead_of_the_vehicle_counts(drive):
