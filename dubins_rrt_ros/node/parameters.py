@@ -3,6 +3,7 @@
 import difflib
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,13 +115,23 @@ class Parameters:
         self._node = node
         for item in OPTIONS.values():
             _declare(node, item)
-        self.read()
+        values = self._values()
+        self._known = values, configuration(values)  # the last that were read; one tuple, as any thread may read
         # Only now: while they are declared one by one, values that belong together come one by one.
         node.add_on_set_parameters_callback(self.check)
 
     def read(self) -> Configuration:
-        """Return the present values."""
-        return configuration(self._values())
+        """Return the present values; any thread may ask for them.
+
+        Between two values that are set together and do not fit each other alone, those before are returned.
+        """
+        values = self._values()
+        known, present = self._known
+        if values != known:
+            with suppress(OptionError):
+                present = configuration(values)
+                self._known = values, present
+        return present
 
     def unknown(self) -> list[str]:
         """Return a warning, of one sentence, for each value given at start-up whose parameter is not declared."""

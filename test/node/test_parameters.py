@@ -314,3 +314,15 @@ def test_what_was_read_does_not_change_later(declared):
     assert (now.settings.samples, now.vehicle.robot_radius) == (3000, 0.2)
     later = node.parameters.read()
     assert (later.settings.samples, later.vehicle.robot_radius) == (10, 0.3)
+
+
+def test_values_are_converted_once_and_between_two_that_belong_together_those_before_hold(declared):
+    holder = declared()
+    before = holder.parameters.read()
+    assert holder.parameters.read() is before
+    holder.node.remove_on_set_parameters_callback(holder.parameters.check)  # rclpy sets one after the other after it
+    change(holder, free_thresh=0.8)
+    assert holder.parameters.read() is before
+    change(holder, occupied_thresh=0.9)
+    options = holder.parameters.read().node
+    assert (options.free_thresh, options.occupied_thresh) == (0.8, 0.9)
