@@ -48,8 +48,8 @@ class NodeOptions:
     replan_on_map_change: bool = option(False, "check what is left of the published path against every new map, and plan again")
     replan_rate: float = option(0.0, "how often the goal is planned again from the newest start, until it is reached; 0 is never",
                                 unit="Hz", low=0.0, high=100.0)
-    replan_gain: float = option(0.05, "share by which a path planned again must be shorter, or cost less, than the rest of the "
-                                      "published one to replace it, unless that is no longer free", low=0.0, high=1.0)
+    replan_gain: float = option(0.05, "share by which a path planned again must be shorter (or cost less) than what is left of "
+                                      "the published one to replace it, unless that is no longer free", low=0.0, high=1.0)
     goal_reached_xy: float = option(0.25, "distance within which a goal is reached, and no longer planned again", unit="m",
                                     low=0.0, high=1e6)
     goal_reached_yaw: float = option(0.5, "heading error within which it is", unit="rad", low=0.0, high=math.pi)

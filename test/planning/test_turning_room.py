@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from support.cases import boxes_grid, empty_map, scaled
+from support.cases import boxes_grid, empty_map, needs_compiled
 from support.refusals import reasons_have_time, walls_with_a_gap, why  # noqa: F401 - a fixture
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, Problem, Settings, Status, Vehicle, kernels_compiled, plan
@@ -55,10 +55,11 @@ def test_a_start_without_a_way_out_ends_at_once():
         assert result.status == Status.NO_VALID_PATH and result.message.startswith("No path exists: ")
 
 
+@needs_compiled
 def test_what_drives_away_can_leave():
     """No proof is wrong: among obstacles all around, no path of a turning radius and more starts where none can."""
     rng, free, proofs = np.random.default_rng(7), 0, 0
-    for number in range(scaled(60, least=10)):
+    for number in range(60):
         grid = boxes_grid(np.random.default_rng(number), boxes=60)
         radius = float(rng.uniform(0.5, 3.0))
         corners = grid.corners()
@@ -91,6 +92,7 @@ def test_too_little_room_to_turn_round():
     assert room_to_turn(straight_on, ClearanceField(corridor), np.array([[10.0, 3.0], [15.0, 3.0], [20.0, 3.0]])) is None
 
 
+@needs_compiled
 def test_a_tunnel_with_a_centimetre_to_spare_is_not_called_too_narrow():
     """Askew to the cells, so that samples lie beside its middle."""
     along = np.array([math.cos(0.3), math.sin(0.3)])
