@@ -11,7 +11,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
-from support.harness import Conversation, assert_says, occupancy
+from support.conversation import Conversation
+from support.harness import assert_says, occupancy
 
 from dubins_rrt_ros.node.conversions import pose_message
 from dubins_rrt_ros.planning import OCCUPIED, UNKNOWN, GridMap, save_map

@@ -14,7 +14,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose, Quaternion
 from nav_msgs.srv import LoadMap
 from std_srvs.srv import Trigger
-from support.harness import Conversation, assert_says
+from support.conversation import Conversation
+from support.harness import assert_says
 
 from dubins_rrt_ros.node.conversions import grid_from, grid_message, pose_message
 from dubins_rrt_ros.planning import OCCUPIED, GridMap, Thresholds, save_map

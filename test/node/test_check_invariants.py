@@ -6,7 +6,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from support.harness import Conversation, assert_says
+from support.conversation import Conversation
+from support.harness import assert_says
 from support.yard import GOAL, QUICK, START
 
 #: The node's own main, but whatever plan() gives back has a lower bound above the length of its path.

@@ -193,8 +193,7 @@ def test_211_no_start_names_the_topics_of_a_start(module_planners, with_file, ma
 def test_213_cancelled_before_a_first_path(with_file):
     _, client = with_file
     client.set_parameters(**ENDLESS)
-    plan_id = client.next_id
-    future = client.begin_plan(START, ON_THE_WAY_OUT)
+    future, plan_id = client.begin_plan(START, ON_THE_WAY_OUT)
     client.call(Trigger, "cancel")
     told = client.status_of(plan_id)
     assert (told["error_code"], told["error_name"], told["level"]) == ("213", "CANCELLED", WARN)

@@ -13,7 +13,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rcl_interfaces.srv import GetParameters
 from support import ticking_planner
-from support.harness import Conversation
+from support.conversation import Conversation
 from support.ticking_planner import INTERVAL
 
 START, GOALS = (1.5, 5.0, 0.0), [(8.5, 5.0, 0.5), (1.5, 2.0, -2.0)]

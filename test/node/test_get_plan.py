@@ -31,7 +31,7 @@ def running(module_planners, tmp_path_factory):
 def planner(running):
     """The process and its client, with quick settings and nothing to do."""
     process, client = running
-    client.call(Trigger, "cancel")
+    client.cancel()
     client.set_parameters(**QUICK)
     return process, client
 
@@ -219,10 +219,10 @@ def test_a_goal_and_a_request_at_the_same_time_are_both_answered_and_neither_end
 def test_a_goal_is_answered_while_get_plan_plans(planner):
     _, client = planner
     client.set_parameters(**ENDLESS)
-    future = client.begin_plan(START, ON_THE_WAY_OUT)
+    future, _ = client.begin_plan(START, ON_THE_WAY_OUT)
     client.set_parameters(**QUICK)
     client.send("start_pose", START)
-    plan_id = client.next_id + 1
+    plan_id = client.next_id
     client.send("goal_pose", GOAL)
     assert client.status_of(plan_id, samples="300")["error_name"] == "NONE"
     assert not future.done()
@@ -231,7 +231,7 @@ def test_a_goal_is_answered_while_get_plan_plans(planner):
 def test_other_services_are_answered_while_get_plan_plans(planner):
     _, client = planner
     client.set_parameters(**ENDLESS)
-    future = client.begin_plan(START, ON_THE_WAY_OUT)
+    future, _ = client.begin_plan(START, ON_THE_WAY_OUT)
     assert client.call(GetMap, "get_map").map.info.width == 100
     assert client.call(GetParameters, "get_parameters", names=["samples"]).values[0].integer_value == ENDLESS["samples"]
     assert client.call(LoadMap, "load_map", map_url="nowhere").result == LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST

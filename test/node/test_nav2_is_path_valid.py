@@ -11,7 +11,6 @@ pytest.importorskip("nav2_msgs", reason="nav2_msgs is not here; .ci/messages bui
 from builtin_interfaces.msg import Time
 from nav2_msgs.srv import IsPathValid
 from nav2_msgs_shapes.srv import LaterIsPathValid
-from std_srvs.srv import Trigger
 from support.harness import Client
 from support.yard import ENDLESS, GOAL, ON_THE_WAY_OUT, QUICK, START
 
@@ -32,7 +31,7 @@ def running(module_planners, map_file):
 
 @pytest.fixture
 def client(running):
-    running.call(Trigger, "cancel")
+    running.cancel()
     running.set_parameters(**QUICK)
     return running
 
@@ -104,7 +103,7 @@ def test_only_what_is_ahead_of_the_vehicle_counts(module_planners, map_file, run
 
 def test_it_answers_while_a_search_is_under_way(client):
     client.set_parameters(**ENDLESS)
-    future = client.begin_plan(START, ON_THE_WAY_OUT)
+    future, _ = client.begin_plan(START, ON_THE_WAY_OUT)
     assert ask(client, message(THROUGH_THE_BOX)).invalid_pose_indices.tolist() == BLOCKED
     assert not future.done()
 

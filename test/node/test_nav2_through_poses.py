@@ -12,7 +12,6 @@ pytest.importorskip("nav2_msgs", reason="nav2_msgs is not here; .ci/messages bui
 from nav2_msgs.action import ComputePathThroughPoses
 from nav2_msgs_shapes.action import LaterThroughPoses
 from nav2_msgs_shapes.msg import Goals
-from std_srvs.srv import Trigger
 from support.harness import poses_of, stamped
 from support.nav2_client import ABORTED, CANCELED, SUCCEEDED, PathClient
 from support.yard import BEHIND, ENDLESS, GOAL, IN_THE_BOX, IN_THE_CHAMBER, ON_THE_WAY_OUT, QUICK, START
@@ -44,7 +43,7 @@ def running(module_planners, map_file):
 @pytest.fixture
 def action(running):
     """The action of a planner with quick settings and nothing to do."""
-    running.client.call(Trigger, "cancel")
+    running.client.cancel()
     running.client.set_parameters(**QUICK)
     return running
 

@@ -46,7 +46,7 @@ def running(module_planners, map_file):
 def action(running):
     """The action of a planner with quick settings and nothing to do."""
     _, action = running
-    action.client.call(Trigger, "cancel")
+    action.client.cancel()
     action.client.set_parameters(**QUICK)
     return action
 

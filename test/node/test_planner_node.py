@@ -13,7 +13,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from support.harness import Conversation, assert_says, poses_of
+from support.conversation import Conversation
+from support.harness import assert_says, poses_of
 from visualization_msgs.msg import Marker
 
 from dubins_rrt_ros.planning import OCCUPIED as OCCUPIED_CELL

@@ -11,7 +11,8 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from geometry_msgs.msg import Point, Pose
 from rcl_interfaces.srv import GetParameters
 from std_srvs.srv import Trigger
-from support.harness import Conversation, poses_of, values_of
+from support.conversation import Conversation
+from support.harness import poses_of, values_of
 from visualization_msgs.msg import Marker
 
 START, GOAL, BEHIND, OCCUPIED = (1.5, 5.0, 0.0), (8.5, 5.0, 0.5), (1.5, 2.0, -2.0), (5.0, 5.0, 0.0)

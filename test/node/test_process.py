@@ -15,7 +15,7 @@ from nav_msgs.srv import LoadMap
 from rcl_interfaces.srv import GetParameters
 from std_srvs.srv import Trigger
 from support import client_to_kill
-from support.harness import Conversation
+from support.conversation import Conversation
 
 from dubins_rrt_ros.node.conversions import grid_message
 from dubins_rrt_ros.node.parameters import OPTIONS

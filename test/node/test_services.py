@@ -38,7 +38,7 @@ def running(module_planners, folder):
 def planner(running, folder):
     """The process and its client, with quick settings, on the yard, with nothing to do."""
     process, client = running
-    client.call(Trigger, "cancel")
+    client.cancel()
     client.set_parameters(**QUICK)
     assert client.call(LoadMap, "load_map", map_url=str(folder / "yard.yaml")).result == 0
     return process, client
@@ -218,21 +218,19 @@ def test_cancel_after_a_first_path_keeps_the_best_one_on_display(planner):
 def test_cancel_ends_all_requests_of_get_plan_and_each_is_answered(planner):
     _, client = planner
     client.set_parameters(**ENDLESS)
-    plan_id = client.next_id
-    futures = [client.begin_plan(START, ON_THE_WAY_OUT) for _ in range(3)]
+    futures, plan_ids = zip(*(client.begin_plan(START, ON_THE_WAY_OUT) for _ in range(3)), strict=True)
     assert not any(future.done() for future in futures)
     assert client.call(Trigger, "cancel").success
     assert [client.response(future).plan.poses for future in futures] == [[], [], []]
-    for number in range(3):
-        told = client.status_of(plan_id + number)
+    for plan_id in plan_ids:
+        told = client.status_of(plan_id)
         assert (told["level"], told["error_name"]) == (DiagnosticStatus.WARN, "CANCELLED")
 
 
 def test_cancel_of_get_plan_after_a_first_path_gives_the_best_one(planner):
     _, client = planner
     client.set_parameters(**ENDLESS)
-    plan_id = client.next_id
-    future = client.begin_plan(START, GOAL)
+    future, plan_id = client.begin_plan(START, GOAL)
     client.call(Trigger, "cancel")
     path = poses_of(client.response(future).plan)
     told = client.status_of(plan_id)
@@ -243,8 +241,8 @@ def test_cancel_of_get_plan_after_a_first_path_gives_the_best_one(planner):
 def test_what_comes_after_a_cancellation_is_planned(planner):
     _, client = planner
     client.set_parameters(**ENDLESS)
-    client.begin_plan(START, ON_THE_WAY_OUT)
-    client.call(Trigger, "cancel")
+    future, _ = client.begin_plan(START, ON_THE_WAY_OUT)
+    client.cancel(future)
     client.set_parameters(**QUICK)
     assert client.plan(START, GOAL)[1]["error_name"] == "NONE"
 

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +111,7 @@ class Client:
         latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.paths, self.statuses, self.trees, self.maps, self.diagnostics = [], [], [], [], []
         self._services = {}
+        self.marks: set[int] = set()
         outputs = [("plan", PathMessage, self.paths), ("planner/status", DiagnosticStatus, self.statuses)]
         if listens_to_tree:
             outputs.append(("planner/tree", MarkerArray, self.trees))
@@ -204,17 +204,47 @@ class Client:
 
     def plan(self, start, goal, **more):
         """Ask get_plan and wait: the path, and the request's status as by `status_of`."""
-        plan_id = self.next_id
         path = self.response(self.request_plan(start, goal, **more)).plan
-        return path, self.status_of(plan_id)
+        return path, self._status(f"a status of {path.header.stamp}", stamp=_seconds(path.header.stamp))
 
     def begin_plan(self, start, goal):
-        """Ask get_plan; a future with its response, of a request that has come in before whatever is asked next."""
-        from nav_msgs.srv import GetMap
+        """Ask get_plan; a future with its response, and its plan_id, of a request that has come in when this returns."""
+        return self._begun(lambda: self.request_plan(start, goal))
 
-        future = self.request_plan(start, goal)
-        self.call(GetMap, "get_map")
-        return future
+    def begin_goal(self, goal) -> int:
+        """Send a goal that differs from the standing one; its plan_id, of a goal that has come in when this returns."""
+        return self._begun(lambda: self.send("goal_pose", goal))[1]
+
+    def _begun(self, ask):
+        """Ask for something: what that gives, and the plan_id, which lies between two marks."""
+        first = last = self.mark()
+        asked, marks = ask(), 0
+        while last == first + marks:
+            last, marks = self.mark(), marks + 1
+        return asked, last - 1
+
+    def mark(self) -> int:
+        """A plan_id of its own, by a topic: requests that came in before have lower ones. All statuses until then are heard."""
+        from geometry_msgs.msg import PoseArray
+
+        if "goal_poses" not in self._publishers:
+            self._publishers["goal_poses"] = self.node.create_publisher(PoseArray, "goal_poses", 10)
+            self.wait_for(self._publishers["goal_poses"].get_subscription_count, "the planner to subscribe to goal_poses")
+        heard = len(self.statuses)
+        self._publishers["goal_poses"].publish(PoseArray())  # none, which is refused and disturbs nothing
+
+        def refusals():
+            return [status for status in self.statuses[heard:] if "no poses in goal_poses" in status.message]
+
+        self.marks.add(plan_id := int(values_of(self.wait_for(refusals, "the refusal of no poses")[0])["plan_id"]))
+        return plan_id
+
+    def cancel(self, *futures):
+        """Have everything cancelled, these requests to get_plan too where they come in later, and hear what is said of it."""
+        from std_srvs.srv import Trigger
+
+        self.wait_for(lambda: self.call(Trigger, "cancel").success and all(future.done() for future in futures), "an end of all")
+        self.mark()
 
     def set_parameters(self, **values):
         """Set parameters of the planner all at once; the rcl_interfaces/SetParametersResult."""
@@ -226,13 +256,16 @@ class Client:
 
     def status_of(self, plan_id: int, **wanted: str) -> dict[str, str]:
         """The values, `level` and `message` of the next status of a request that has the wanted values."""
+        return self._status(f"a status of request {plan_id} with {wanted}", plan_id=str(plan_id), **wanted)
+
+    def _status(self, what: str, **wanted: str) -> dict[str, str]:
         def find():
             for status in self.statuses:
                 values = values_of(status)
-                if values["plan_id"] == str(plan_id) and wanted.items() <= values.items():
+                if wanted.items() <= values.items():
                     return values | {"level": status.level, "message": status.message, "name": status.name}
             return None
-        return self.wait_for(find, f"a status of request {plan_id} with {wanted}")
+        return self.wait_for(find, what)
 
     @property
     def next_id(self) -> int:
@@ -243,70 +276,6 @@ class Client:
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
-
-
-class Conversation:
-    """Requests to one planner, one after the other, by a client that sends all of them.
-
-    Attributes:
-        asked: the plan_id of the newest request.
-    """
-
-    def __init__(self, process: NodeProcess, client: Client):
-        self.process, self.client = process, client
-        self.asked = 0
-        self._goal = None  # that was sent last
-
-    def start(self, pose, topic: str = "start_pose") -> None:
-        """Send a start that the next goal finds, though topics keep no common order: without any, a goal waits for it."""
-        from geometry_msgs.msg import Point, Pose
-
-        self.refused_start(Pose(position=Point(x=math.nan)))
-        self.client.send(topic, pose)
-
-    def refused_start(self, pose, frame: str = "map", topic: str = "start_pose") -> dict[str, str]:
-        """The status after a start that cannot be used; the planner knows none then."""
-        self.client.statuses.clear()
-        self.client.send(topic, pose, frame)
-        names = ("INVALID_POSE", "TF_ERROR")  # and not what was said of maps before
-        name = self.client.wait_for(lambda: next((values["error_name"] for values in map(values_of, self.client.statuses)
-                                                  if values["plan_id"] == "0" and values["error_name"] in names), None),
-                                    "the refusal of a start")
-        return self.client.status_of(0, error_name=name)
-
-    def goal(self, pose, frame: str = "map", **wanted: str) -> dict[str, str]:
-        """The status of a goal, the first that has the wanted values. The same goal again is planned anew."""
-        from std_srvs.srv import Trigger
-
-        if pose == self._goal:
-            self.client.call(Trigger, "cancel")  # while it is planned, the same would not disturb it
-        self._goal = pose
-        self.asked += 1
-        self.client.statuses.clear()
-        self.client.send("goal_pose", pose, frame)
-        return self.client.status_of(self.asked, **wanted)
-
-    def plan(self, start, goal, **more) -> tuple[dict[str, str], list]:
-        """The status of a request to get_plan, and the poses of its response."""
-        self.asked += 1
-        self.client.statuses.clear()
-        future = self.client.request_plan(start, goal, **more)
-        response = self.client.wait_for(lambda: future.done() and future.result(), "a plan")
-        return self.client.status_of(self.asked), response.plan.poses
-
-
-    @contextmanager
-    def going_on(self, start, goal, map_id: str):
-        """Whatever is done within, a good goal is answered after it, on this map, and nothing was a defect."""
-        said = len(self.process.output)
-        yield
-        self.start(start)
-        told = self.goal(goal)
-        assert (told["error_name"], told["map_id"]) == ("NONE", map_id)
-        assert self.process.running
-        log = self.process.output[said:]
-        assert "Traceback" not in log
-        assert "Warning" not in log, "numpy warns"
 
 
 class Planners:
@@ -388,6 +357,11 @@ def stamped(pose, frame: str = "map"):
     message = PoseStamped(pose=pose if isinstance(pose, Pose) else pose_message(pose))
     message.header.frame_id = frame
     return message
+
+
+def _seconds(stamp) -> str:
+    """A stamp as a status has it."""
+    return f"{stamp.sec}.{stamp.nanosec:09}"
 
 
 def _yaml(value) -> str:

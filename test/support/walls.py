@@ -1,7 +1,6 @@
 """Maps with and without walls, which a planner hears by topic, and the paths that it shows on them."""
 
 import numpy as np
-from std_srvs.srv import Trigger
 
 from dubins_rrt_ros.planning import GridMap
 from support.harness import occupancy, poses_of, values_of
@@ -36,7 +35,7 @@ def publish(client, process, cells):
 
 def show_path(client, process):
     """The id of a request whose path, straight through the free map, is on display."""
-    client.call(Trigger, "cancel")
+    client.cancel()
     client.set_parameters(**QUICK)
     publish(client, process, FREE)
     client.send("start_pose", START)
