@@ -168,6 +168,8 @@ class _Call:
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
                         self._report_samples)
+        if search.objective.is_length:
+            self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over)
         for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field))):
             if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
                 return trapped
@@ -175,22 +177,25 @@ class _Call:
                 self._time_to_found = self._elapsed
                 deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
             self._report(search)
+            if self._proof and self._best:
+                self._proof.follow(self._best.path, search.length_bounds)
             deadline.poll()
-            if deadline.is_over or (may_end and (deadline.is_due or self._is_proved(search, field))):
+            if deadline.is_over or (may_end and (deadline.is_due or self._is_proved(search))):
                 break
         return self._end_of(search, field)
 
-    def _is_proved(self, search: Search, field: ClearanceField) -> bool:
+    def _is_proved(self, search: Search) -> bool:
         """Return True if the best path is proved to be as near to the shortest, or the cheapest, possible as asked for."""
         gap = self._settings.stop_gap
         if self._best is None or gap == 0:
             return False
-        if self._settings.preferred_clearance_of(self._problem.vehicle) > 0:
-            return search.bound is not None and self._best.cost <= (1 + gap) * lower_bound(self._problem, search.bound)
-        if self._proof is None:
-            self._proof = BackgroundProof(self._problem, field, self._best.path, gap, lambda: self._deadline.is_over)
-        self._proof.follow(self._best.path.length)
-        return self._proof.holds
+        if self._proof:
+            return self._proof.holds
+        return search.bound is not None and self._best.cost <= (1 + gap) * lower_bound(self._problem, search.bound)
+
+    def _take_proved(self, bound: float) -> None:
+        """Take over a length that no path falls below; none costs less than its length."""
+        self._bound, self._cost_bound = max(self._bound, bound), max(self._cost_bound, bound)
 
     def _usable_seed(self, field: ClearanceField) -> Path | None:
         """Return the path that the seed path gives for this problem, if it does."""
@@ -283,6 +288,8 @@ class _Call:
             self._cost_bound = lower_bound(self._problem, search.bound)
             if search.objective.is_length:
                 self._bound = self._cost_bound
+        if self._proof:
+            self._take_proved(self._proof.bound)
         if self._best:
             return self._with_path(self._best, running=True)
         message = f"No path so far: {self._drawn(search.samples, search.growing.size)}."
@@ -315,8 +322,8 @@ class _Call:
             self._cost_bound = lower_bound(self._problem, bound)
             self._bound = lower_bound(self._problem, search.make_length_bound())
         if self._proof:
-            self._proof.follow(path.length)
-            self._bound = max(self._bound, self._proof.finish(0.0 if cancelled else self._deadline.left))
+            self._proof.follow(path, None)
+            self._take_proved(self._proof.finish(0.0 if cancelled else self._deadline.left))
         return self._with_path(self._best or audited, cancelled)
 
     def _time_for_bound(self) -> float:
@@ -372,7 +379,8 @@ class _Call:
         """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
         bound, cost_bound, elapsed = min(self._bound, best.path.length), min(self._cost_bound, best.cost), self._elapsed
-        proved = self._proof is not None and gap_above(bound, best.path.length) <= self._settings.stop_gap + SAME
+        stop_gap = self._settings.stop_gap
+        proved = self._proof is not None and 0 < stop_gap >= gap_above(bound, best.path.length) - SAME
         message = success_message(self._problem, self._settings, best, (bound, cost_bound), elapsed, cancelled=cancelled,
                                   running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,

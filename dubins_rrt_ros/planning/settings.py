@@ -47,6 +47,8 @@ class Settings:
                                  "0.01", unit="m", low=0.0, high=1000.0)
     stop_gap: float = option(0.0, "end as soon as the path is proved to be at most this share longer than the shortest possible; "
                              "0 is never", low=0.0, high=1.0)
+    length_proof: bool = option(True, "raise lower_bound towards the path's length, on a second core beside the search; it takes "
+                                "no longer; without effect on one core, with informed: false, and for rrt")
     seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
 
     def __post_init__(self) -> None:

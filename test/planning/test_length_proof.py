@@ -109,7 +109,7 @@ def test_every_path_crosses_the_levels_in_order(maze):
 @needs_compiled
 def test_the_gap_of_the_maze_is_closed(maze):
     """The bound by the eikonal equation is 5 % below the path."""
-    result = plan(maze, Settings(seed=1, samples=3000))
+    result = plan(maze, Settings(seed=1, samples=3000, length_proof=False))
     assert result.gap > 0.04
     proof = LengthProof(maze, maze.world.field, result.path)
     proof.run(rounds(400), gap=0.015)
@@ -179,6 +179,19 @@ def test_a_proof_that_cannot_be_had_ends_with_the_time(maze):
     assert result.lower_bound <= result.length
 
 
-def test_without_a_gap_to_stop_at_nothing_is_proved(maze, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.BackgroundProof", never)
+@needs_compiled
+def test_the_gap_is_told_at_every_request_and_the_path_is_the_same(maze, monkeypatch):
+    """On two cores, with the time that a proof needs; with neither it is left out."""
+    monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 2)
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.background.cores", lambda: 2)
+    without = plan(maze, Settings(seed=1, samples=20_000, planning_time=60.0, length_proof=False))
+    beside = plan(maze, Settings(seed=1, samples=20_000, planning_time=60.0))
+    assert beside.path == without.path and beside.samples == without.samples
+    assert without.lower_bound < beside.lower_bound == beside.cost_lower_bound <= beside.length
+    assert "proved" not in beside.message
+
+
+def test_on_one_core_nothing_is_proved_without_a_gap_to_stop_at(maze, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 1)
+    monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.LengthProof", never)
     assert plan(maze, Settings(seed=1, samples=scaled(200))).solved

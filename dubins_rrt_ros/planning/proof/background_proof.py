@@ -1,37 +1,59 @@
 """The proof of a search that is under way, beside it on another core."""
 
+import math
 import time
 from collections.abc import Callable
 
+from .._kernels import COMPILED
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..problem import Problem
-from ..search.background import PROOFS
+from ..search.background import PROOFS, BackgroundJob, cores
+from ..search.cost_bounds import LengthBounds
+from ..settings import Settings
 from .length_proof import LengthProof
+
+#: Gap at which a proof ends where no `stop_gap` says so: what is less is in the margins that paths keep from obstacles.
+NEGLIGIBLE_GAP = 5e-4
 
 
 class BackgroundProof:
-    """Raises the lower bound of the lengths of a problem's paths until the best one is at most `gap` above it.
+    """Raises the lower bound of the lengths of a problem's paths towards the length of the best one.
 
-    On one core it waits for `finish`.
+    On one core it would take the search's time: there it is started for a `stop_gap` alone, and waits for `finish`.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, path: Path, gap: float, interrupted: Callable[[], bool]):
-        """Start.
+    def __init__(self, problem: Problem, field: ClearanceField, settings: Settings, interrupted: Callable[[], bool]):
+        """Prepare it; `follow` starts it.
 
         Args:
             interrupted: asked every few milliseconds, from another thread; True ends the proof with the bound so far.
         """
-        self._gap, self._interrupted = gap, interrupted
-        self._length, self._is_over = path.length, False
+        self._problem, self._field, self._interrupted = problem, field, interrupted
+        self._waits, self._needs_bounds = settings.stop_gap > 0, settings.informed
+        self._gap = settings.stop_gap or NEGLIGIBLE_GAP
+        self._is_beside = settings.length_proof and settings.informed and COMPILED and cores() > 1
+        self._length, self._is_over = math.inf, False
         self._proof: LengthProof | None = None
-        self._job = PROOFS.start(self._run, problem, field, path)
+        self._job: BackgroundJob[None] | None = None
 
-    def _run(self, problem: Problem, field: ClearanceField, path: Path) -> None:
+    def follow(self, path: Path, bounds: LengthBounds | None) -> None:
+        """Go on with a shorter path, or start.
+
+        Args:
+            bounds: of the search, which nothing changes any more, or None as long as there are none.
+        """
+        self._length = min(path.length, self._length)
+        if self._proof:
+            self._proof.length = self._length
+        elif self._job is None and (self._waits or self._is_beside) and (bounds or not self._needs_bounds):
+            self._job = PROOFS.start(self._run, path, bounds)
+
+    def _run(self, path: Path, bounds: LengthBounds | None) -> None:
         if self._is_interrupted():
             return
-        self._proof = LengthProof(problem, field, path, interrupted=self._is_interrupted)
-        self.follow(self._length)
+        self._proof = LengthProof(self._problem, self._field, path, bounds, interrupted=self._is_interrupted)
+        self._proof.length = self._length
         self._proof.run(self._is_interrupted, self._gap)
 
     def _is_interrupted(self) -> bool:
@@ -47,18 +69,12 @@ class BackgroundProof:
         """True if the best path is proved to be at most the gap above the shortest possible."""
         return self._length <= (1 + self._gap) * self.bound
 
-    def follow(self, length: float) -> None:
-        """Go on with the length of a shorter path [m]."""
-        self._length = min(length, self._length)
-        if self._proof:
-            self._proof.length = self._length
-
     def finish(self, seconds: float) -> float:
-        """Wait for so long at most, end the proof, and return its bound [m]."""
+        """Wait for so long at most where there is a `stop_gap`, end the proof, and return its bound [m]."""
         until = time.perf_counter() + seconds
         interrupted = self._interrupted
         self._interrupted = lambda: interrupted() or time.perf_counter() > until
-        if not self.holds and seconds > 0 and self._job.wait(seconds):
+        if self._waits and self._job and not self.holds and seconds > 0 and self._job.wait(seconds):
             self._job()
         self._is_over = True
         return self.bound

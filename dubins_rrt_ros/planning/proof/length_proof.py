@@ -20,6 +20,7 @@ from ..curves import dubins
 from ..curves.path import Path
 from ..deadline import OutOfTime, never
 from ..problem import Problem
+from ..search.cost_bounds import LengthBounds
 from .boxes import Layer
 from .level_sets import LevelSets
 
@@ -54,19 +55,20 @@ class LengthProof:
         length: length of the best path that is known [m]; to be lowered when a shorter one is found.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, path: Path, limit: float = math.inf,
-                 interrupted: Callable[[], bool] = never):
+    def __init__(self, problem: Problem, field: ClearanceField, path: Path, bounds: LengthBounds | None = None,
+                 limit: float = math.inf, interrupted: Callable[[], bool] = never):
         """Prepare the proof, in milliseconds to tenths of a second.
 
         Args:
             path: a path of the problem, by whose contacts the first levels are chosen.
+            bounds: as `LevelSets` takes them.
             limit: `length` will be at most this; by default the length of the path [m].
             interrupted: asked before each level; True leaves the other levels out, with which the bound would rise further.
         """
         self.length = path.length
         self._problem, self._field = problem, field
         self._radius = problem.vehicle.turning_radius
-        self._sets = LevelSets(problem, field)
+        self._sets = LevelSets(problem, field, bounds)
         self.bound = min(self._sets.bound, self.length)
         self._limit_of_sets = limit if limit < math.inf else self.length
         self._interrupted = interrupted

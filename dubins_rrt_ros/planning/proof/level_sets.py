@@ -15,6 +15,7 @@ from .._kernels import UNLIMITED
 from ..collision.clearance import ClearanceField
 from ..curves.angles import wrap
 from ..problem import Problem
+from ..search.cost_bounds import LengthBounds
 from ..search.cost_to_go import CostToGo
 
 #: The corners (column, row) of the triangles of a square that is split along each of its diagonals.
@@ -44,12 +45,12 @@ class LevelSets:
         end: where a path reaches the goal the cost is at least this [m]: it crosses all levels below.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField):
-        """Compute the costs from the start and to the goal, as lower bounds."""
+    def __init__(self, problem: Problem, field: ClearanceField, bounds: LengthBounds | None = None):
+        """Take the lengths from the start and to the goal, which must be lower bounds, or compute them."""
         self._field = field
         self._required_clearance = problem.vehicle.required_clearance
-        self._to_goal = CostToGo.to_goal(problem, field).make_bound()
-        self._from_start = CostToGo.from_start(problem, field).make_bound()
+        self._from_start, self._to_goal = bounds or LengthBounds(CostToGo.from_start(problem, field).make_bound(),
+                                                                 CostToGo.to_goal(problem, field).make_bound())
         self._costs = self._from_start.kernel.nodes()
         self._least, self._most = _least_of_corners(self._costs), -_least_of_corners(-self._costs)
         self._is_free = field.free_squares(self._required_clearance).is_free[:-1, :-1] != 0

@@ -1,9 +1,11 @@
 """Work in the background, whose results do not depend on when or where they were computed."""
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
+from contextlib import suppress
 from functools import cache
 from typing import Generic, ParamSpec, TypeVar
 
@@ -42,9 +44,13 @@ class BackgroundExecutor:
 
     So no job waits for another, and any number of requests can share one executor. On a single core every job is run by the
     caller that asks for its result. A job must not change what its caller works on; kernels release the interpreter's lock.
+
+    Args:
+        niceness: of the threads, where the system knows such of threads: with more than 0 they take what others leave.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, niceness: int = 0) -> None:
+        self._niceness = niceness
         self._pool: ThreadPoolExecutor | None = None
 
     def start(self, function: Callable[Parameters, Result], *args: Parameters.args, **kwargs: Parameters.kwargs
@@ -56,8 +62,15 @@ class BackgroundExecutor:
         if cores() == 1:
             return BackgroundJob(compute, None)
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="dubins_rrt_background")
+            self._pool = ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="dubins_rrt_background",
+                                            initializer=self._give_way)
         return BackgroundJob(compute, self._pool.submit(compute))
+
+    def _give_way(self) -> None:
+        """Lower the priority of this thread: 0 is the thread on Linux, where each has its own."""
+        if self._niceness and sys.platform == "linux":
+            with suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, 0, self._niceness)
 
     def forget_threads(self) -> None:
         """Start new threads for the next jobs, as a forked process must: it has none of its parent's."""
@@ -65,7 +78,7 @@ class BackgroundExecutor:
 
 
 #: The executors of this process: for the searches, and for proofs, for which no search may have to wait.
-BACKGROUND, PROOFS = BackgroundExecutor(), BackgroundExecutor()
+BACKGROUND, PROOFS = BackgroundExecutor(), BackgroundExecutor(niceness=10)
 if hasattr(os, "register_at_fork"):
     for executor in (BACKGROUND, PROOFS):
         os.register_at_fork(after_in_child=executor.forget_threads)

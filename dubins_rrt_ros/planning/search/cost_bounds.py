@@ -1,6 +1,7 @@
 """Lower bounds of the costs from the start and to the goal, computed in the background."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,13 @@ from .cost_to_go import CostToGo
 
 #: Minimum relative fall of the best cost for which nodes are pruned again.
 LEAST_FALL = 1e-4
+
+
+class LengthBounds(NamedTuple):
+    """The lengths of the ways from the start and to the goal, as lower bounds."""
+
+    from_start: CostToGo
+    to_goal: CostToGo
 
 
 class CostBounds:

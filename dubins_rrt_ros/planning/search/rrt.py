@@ -41,7 +41,7 @@ from ..problem import Problem
 from ..settings import Settings
 from .corridors import Corridors
 from .cost import Objective
-from .cost_bounds import CostBounds
+from .cost_bounds import CostBounds, LengthBounds
 from .cost_to_go import CostToGo
 from .growing_tree import GrowingTree
 from .hybrid_astar import HybridAStarRuns
@@ -136,6 +136,12 @@ class Search:
         """The cost-to-go as a lower bound, once the search needed it, or None."""
         bounds = self._informed.bounds if self._informed else None
         return bounds.to_goal if bounds and bounds.from_start else None
+
+    @property
+    def length_bounds(self) -> LengthBounds | None:
+        """The lengths from the start and to the goal as lower bounds, once the search has both, or None."""
+        bounds = self._informed.bounds if self._informed and self.objective.is_length else None
+        return LengthBounds(bounds.from_start, bounds.to_goal) if bounds and bounds.from_start else None
 
     @property
     def tree(self) -> Tree:
