@@ -15,7 +15,7 @@ from dubins_rrt_ros.planning.audit.document import document_findings, pose_findi
 from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
 from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
-from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request
+from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request
 from dubins_rrt_ros.planning.result import pose_spacing
 from dubins_rrt_ros.planning.text import one_line, quoted
 
@@ -115,7 +115,8 @@ def _judge(arguments: argparse.Namespace) -> Verdict:
 
 
 def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse.Namespace) -> Verdict:
-    problem, settings = read_request(document, world_map)
+    # Where a function took part, it is named as not judged.
+    problem, settings = read_request({key: value for key, value in document.items() if key not in HOOKS}, world_map)
     spacing = settings.path_spacing if arguments.any_map else pose_spacing(problem, settings)
     path = read_path(document)
     if path is None:

@@ -21,6 +21,7 @@ from .collision.clearance import ClearanceField
 from .curves.dubins import WORDS, CurveError, DubinsCurve
 from .curves.path import Path, PathError
 from .errors import PlanningError
+from .hooks import HookError
 from .maps.errors import MapError, MapMetadataError, MapNotFound
 from .maps.files import load_map
 from .maps.grids import save_map
@@ -44,8 +45,8 @@ __all__ = [  # noqa: RUF022 - by what a user needs, in this order
     # maps
     "FREE", "OCCUPIED", "UNKNOWN", "GridMap", "Map", "PolygonMap", "Thresholds", "rasterise", "save_map",
     # errors
-    "PlanningError", "CurveError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError", "PathError",
-    "PictureError", "PlanError", "TreeError",
+    "PlanningError", "CurveError", "HookError", "InvalidPose", "MapError", "MapMetadataError", "MapNotFound", "OptionError",
+    "PathError", "PictureError", "PlanError", "TreeError",
     # the rest
     "WORDS", "ClearanceField", "Pose", "checked_pose", "kernels_compiled", "options", "values",
 ]

@@ -54,12 +54,14 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     """
     path, samples = answer.path, answer.samples
     so_far = " so far" if running else ""
-    above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved else "")
+    above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved and not problem.is_free else "")
     found = f", found by {ALGORITHMS[answer.found_by]}" if answer.found_by else ""
     drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample"
     message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {'cancelled ' if cancelled else ''}{drawn} in {elapsed:.3g} s"
     if problem.vehicle.required_clearance < 0:
         message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
+    if problem.is_free:
+        message += f"; is_free was asked every {problem.fine_spacing:g} m along it, and not between"
     if problem.exact_goal:
         return message + "."
     off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)

@@ -9,16 +9,20 @@ from dubins_rrt_ros import __version__
 from .curves.dubins import WORDS, DubinsCurve
 from .curves.path import Path, PathError
 from .errors import PlanningError
+from .hooks import IsFree, Sampler, name_of
 from .maps.model import Map
 from .option import is_number, options, values
 from .problem import Problem, Waypoint, checked_pose, checked_waypoint
 from .result import Plan
 from .settings import MAX_PLANNING_TIME, Settings
-from .text import quoted
+from .text import quoted, quoted_name
 from .vehicle import Vehicle
 
 #: Settings that a document of an earlier version lacks, as that version planned.
 BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0}
+
+#: Keys of the functions that a document names.
+HOOKS = ("is_free", "sampler")
 
 
 class PlanFileError(PlanningError, ValueError):
@@ -46,7 +50,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
         "poses": plan.poses().tolist(),
-        **_waypoints_document(plan),
+        **_waypoints_document(plan), **_hooks_document(plan),
         "map": map_name, "map_id": problem.map.id, "start": list(problem.start), "goal": list(problem.goal),
         "vehicle": values(problem.vehicle), "settings": values(problem) | values(settings), "version": __version__,
     }
@@ -64,31 +68,45 @@ def _waypoints_document(plan: Plan) -> dict[str, Any]:
     return {"waypoints": [list(waypoint) for waypoint in plan.waypoints], "waypoint_indices": list(plan.waypoint_indices)}
 
 
+def _hooks_document(plan: Plan) -> dict[str, Any]:
+    """Return the names of the user's functions that took part."""
+    functions = (plan.problem.is_free, plan.settings.sampler)
+    return {key: name_of(function) for key, function in zip(HOOKS, functions, strict=True) if function}
+
+
 def _curve_document(curve: DubinsCurve) -> dict[str, Any]:
     return {"start": [float(c) for c in curve.start], "radius": float(curve.radius), "word": curve.word,
             "lengths": [float(length) for length in curve.lengths]}
 
 
-def read_request(document: Mapping[str, Any], world_map: Map) -> tuple[Problem, Settings]:
+def read_request(document: Mapping[str, Any], world_map: Map, *, is_free: IsFree | None = None, sampler: Sampler | None = None
+                 ) -> tuple[Problem, Settings]:
     """Return the request that a document answers, for planning it again on a map.
 
     The time limit is lifted to the largest allowed, and the sample budget is what was drawn: a deadline and a
     cancellation only cut the sequence of samples short, so the same number of them gives the same path on a machine of
     any speed. So does a proof, which is not made again. Where nothing was drawn, the budget stays as it was.
 
+    Args:
+        is_free, sampler: the functions that the plan was made with; a document has their names alone.
+
     Raises:
-        PlanFileError: something is missing, or is of another type.
+        PlanFileError: something is missing, or is of another type, such a function among it.
         OptionError, InvalidPose: a value is out of range.
     """
+    for key, function in zip(HOOKS, (is_free, sampler), strict=True):
+        if key in document and function is None:
+            raise PlanFileError(f"it was planned with {key} {quoted_name(str(document[key]))}, a function, which no file holds; "
+                                f"plan it again in Python, by read_request(document, map, {key}=...)")
     fields = dict(_field(document, "settings", Mapping))
     vehicle = Vehicle(**_known(Vehicle, _field(document, "vehicle", Mapping), "vehicle"))
     request = {item.name: fields.pop(item.name) for item in options(Problem) if item.name in fields}
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
-    problem = Problem(world_map, vehicle, start, goal, **request)
+    problem = Problem(world_map, vehicle, start, goal, **request, is_free=is_free)
     fields = _known(Settings, BEFORE | fields, "settings")
     drawn = _field(document, "samples", int)
     return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"],
-                                          "stop_gap": 0.0})
+                                          "stop_gap": 0.0, "sampler": sampler})
 
 
 def read_waypoints(document: Mapping[str, Any]) -> tuple[Waypoint, ...]:

@@ -13,6 +13,7 @@ from .answer import LEAST_IMPROVEMENT, AuditedPath, not_audited_message, success
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
+from .collision.own_test import OwnTest
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import WholePlans, find_departure
@@ -28,7 +29,7 @@ from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
 from .settings import Settings
-from .world import World, prepare
+from .world import World, world_of
 
 #: Maximum time between two reports of progress [s].
 REPORT_INTERVAL = 0.05
@@ -75,6 +76,9 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
 
     Returns:
         A Plan with an audited path, or with a status and a message that say why there is none.
+
+    Raises:
+        HookError: `is_free` of the problem or `sampler` of the settings raised an exception, or gave what it should not.
     """
     return _Call(problem, with_seed(settings or Settings()), cancel or never, on_progress or _ignore, report_samples,
                  seed_path).answer()
@@ -103,6 +107,7 @@ class _Call:
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
         self._bound = self._cost_bound = lower_bound(problem)
         self._obstacles: Obstacles | None = None  # until the world is ready
+        self._own_test: OwnTest | None = None
         self._best: AuditedPath | None = None
         self._audit_took = self._simplifying_took = 0.0
         self._found_cost = math.inf  # of the best path of the search that was audited last
@@ -117,6 +122,13 @@ class _Call:
         return self._deadline.elapsed
 
     def answer(self) -> Plan:
+        """Return the plan; raise what a test of the user's raised."""
+        answer = self._answer()
+        if self._own_test:
+            self._own_test.raise_error()
+        return answer
+
+    def _answer(self) -> Plan:
         """Prepare the world, look for reasons against a path, and search."""
         if self._is_cancelled():
             return self._cancelled(self._root, 0)
@@ -153,10 +165,9 @@ class _Call:
     def _prepared_world(self) -> World:
         """Return the problem's world, or prepare one; the request's own time begins when it is ready."""
         _keep_freed_memory()
-        problem = self._problem
-        world = problem.world
-        if not isinstance(world, World):
-            world = prepare(problem.map, problem.vehicle, problem.allow_unknown)
+        world = world_of(self._problem).with_test_of(self._problem)
+        if own_test := world.field.own_test:
+            self._own_test, self._deadline.cancel = own_test, own_test.cancel(self._deadline.cancel)
         self._obstacles = world.obstacles
         self._map_time = self._elapsed
         self._deadline.restart()
@@ -358,6 +369,8 @@ class _Call:
             why = f"allow more {more}"
         elif self._settings.goal_bias == 0 and self._problem.exact_goal and not self._settings.informed:
             why, location = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
+        if self._own_test:
+            why += f"; is_free was asked {self._own_test.asked} times and refused {self._own_test.refused}"
         return self._plan(Status.TIMEOUT, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location)
 
     def _trapped(self, search: Search, field: ClearanceField) -> Plan | None:

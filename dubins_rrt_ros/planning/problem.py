@@ -7,11 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from .errors import PlanningError
+from .hooks import IsFree, check_function
 from .maps.frame import LARGEST_YAW
 from .maps.model import GridMap, Map, PolygonMap
 from .option import OptionError, convert_options, documented, option
 from .text import quoted
 from .vehicle import Vehicle
+
+#: Minimum spacing of poses that show a path in detail [m].
+MIN_FINE_SPACING = 0.01
 
 Pose = tuple[float, float, float]
 #: A pose to be passed, or a place, with None for the heading, that is passed with any.
@@ -52,8 +56,11 @@ class Problem:
         vehicle: turning radius and size.
         start, goal: (x [m], y [m], theta [rad]) in the map's frame.
         world: the map as `prepare` made it ready for the vehicle, or None: then plan() does that first.
+        is_free: a test of yours for obstacles that the map does not have, or None: `is_free(poses)` gives a bool for each of
+            (n, 3) poses. It is asked at poses at most `fine_spacing` apart, holds there along the path, and is slow.
 
     Raises:
+        HookError: is_free is no function.
         InvalidPose: a pose has not three finite numbers.
         OptionError: a tolerance is of the wrong type or out of range, or the world is prepared for something else.
     """
@@ -71,11 +78,12 @@ class Problem:
     start_slack: float = option(0.0, "how much nearer than allowed to an obstacle the vehicle may stand at its start, if it can "
                                 "leave without coming any nearer", unit="m", low=0.0, high=1000.0)
     world: PreparedMap | None = field(default=None, repr=False)
+    is_free: IsFree | None = None
 
     def __init__(self, map: Map | PreparedMap, vehicle: Vehicle | None = None,  # noqa: A002 - a public name
                  start: Sequence[float] = (), goal: Sequence[float] = (), goal_tolerance_xy: float = 0.0,
                  goal_tolerance_yaw: float = 0.0, any_goal_heading: bool = False, allow_unknown: bool = False,
-                 start_slack: float = 0.0, world: PreparedMap | None = None):
+                 start_slack: float = 0.0, world: PreparedMap | None = None, is_free: IsFree | None = None):
         """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
         if not isinstance(map, GridMap | PolygonMap):
             _check_fit(map, vehicle, allow_unknown)
@@ -88,7 +96,8 @@ class Problem:
         given = {"map": map, "vehicle": vehicle, "start": checked_pose("start", start), "goal": checked_pose("goal", goal),
                  "goal_tolerance_xy": goal_tolerance_xy, "goal_tolerance_yaw": goal_tolerance_yaw,
                  "any_goal_heading": any_goal_heading, "allow_unknown": allow_unknown,
-                 "start_slack": start_slack, "world": world}
+                 "start_slack": start_slack, "world": world, "is_free": is_free}
+        check_function("is_free", is_free)
         for name, value in given.items():
             object.__setattr__(self, name, value)
         convert_options(self)
@@ -105,6 +114,16 @@ class Problem:
     def exact_goal(self) -> bool:
         """True if one pose alone is the goal."""
         return self.goal_tolerance_xy == 0 and self.yaw_tolerance == 0
+
+    @property
+    def fine_spacing(self) -> float:
+        """The spacing of poses that show a path in detail [m].
+
+        The smaller of a cell, or of a polygon map a quarter of the inscribed radius, and a tenth of the turning radius; at least
+        0.01 m.
+        """
+        detail = self.map.resolution if isinstance(self.map, GridMap) else self.vehicle.inscribed_radius / 4
+        return max(MIN_FINE_SPACING, min(detail, self.vehicle.turning_radius / 10))
 
 
 def _check_fit(world: PreparedMap, vehicle: Vehicle | None, allow_unknown: bool) -> None:

@@ -13,7 +13,6 @@ from .curves.angles import heading_error, position_error
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
 from .errors import PlanningError
-from .maps.model import GridMap
 from .pictures import Plottable, check_matplotlib
 from .problem import Pose, Problem, Waypoint
 from .search.tree import Tree
@@ -22,9 +21,6 @@ from .vehicle import Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-#: Minimum distance between two poses of a path where the settings leave it to map and vehicle [m].
-MIN_FINE_SPACING = 0.01
 
 
 class Status(IntEnum):
@@ -242,9 +238,7 @@ def waypoint_arc_lengths(plan: Plan) -> list[float]:
 
 def pose_spacing(problem: Problem, settings: Settings) -> float:
     """Return the maximum distance between two poses of a path [m]: that of the settings, or a fine one where that is 0."""
-    world_map, vehicle = problem.map, problem.vehicle
-    detail = world_map.resolution if isinstance(world_map, GridMap) else vehicle.inscribed_radius / 4
-    return settings.path_spacing or max(MIN_FINE_SPACING, min(detail, vehicle.turning_radius / 10))
+    return settings.path_spacing or problem.fine_spacing
 
 
 def reaches_goal(pose: Pose, problem: Problem, rounding: float) -> bool:

@@ -1,8 +1,9 @@
 """The settings of the planner: one frozen dataclass whose fields are options."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from .hooks import Sampler, check_function
 from .option import OptionError, convert_options, documented, option
 from .vehicle import Vehicle
 
@@ -21,7 +22,12 @@ PAPER = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 class Settings:
     """The planner's settings.
 
+    Attributes:
+        sampler: a function of yours that draws the samples, or None: `sampler(rng, n)` gives (n, 3) poses. The share `goal_bias`
+            of them is at the goal all the same. It is no option: files and the node do not know it.
+
     Raises:
+        HookError: the sampler is no function.
         OptionError: an option is of the wrong type or out of range.
     """
 
@@ -50,9 +56,11 @@ class Settings:
     length_proof: bool = option(True, "raise lower_bound towards the path's length, on a second core beside the search; it takes "
                                 "no longer; without effect on one core, with informed: false, and for rrt")
     seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
+    sampler: Sampler | None = field(default=None)
 
     def __post_init__(self) -> None:
         convert_options(self)
+        check_function("sampler", self.sampler)
         if 0 < self.path_spacing < MIN_SPACING:
             raise OptionError(f"path_spacing is {self.path_spacing:g}; give 0 or at least {MIN_SPACING:g} [m]")
         if -1 < self.preferred_clearance < 0:

@@ -33,7 +33,7 @@ from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
-from .world import World, prepare
+from .world import world_of
 
 #: Number of headings that are tried at a waypoint.
 HEADINGS = 72
@@ -75,11 +75,13 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
         the waypoint which is not reached.
 
     Raises:
-        InvalidPose: a waypoint is none.
+        HookError, InvalidPose: a function of the user's is wrong, as `plan` says; a waypoint is none.
     """
     waypoints = tuple(checked_waypoint(f"waypoint {number}", pose) for number, pose in enumerate(poses, 1))
     call = _Call(problem, waypoints, with_seed(settings or Settings()), cancel or never, on_progress)
-    return replace(call.answer(), waypoints=waypoints)
+    answer = call.answer()
+    call.world.field.raise_test_error()
+    return replace(answer, waypoints=waypoints)
 
 
 class _Call:
@@ -89,11 +91,9 @@ class _Call:
                  on_progress: Callable[[Progress], None] | None):
         self._waypoints, self._settings, self._cancel, self._on_progress = waypoints, settings, cancel, on_progress
         self._clock = Deadline(settings.planning_time, cancel)
-        world = problem.world
-        if not isinstance(world, World):
-            world = prepare(problem.map, problem.vehicle, problem.allow_unknown)
-        self._world, self._problem = world, replace(problem, world=world)
-        self._objective = Objective.of(self._problem, settings, world.field)
+        world = world_of(problem)
+        self._problem, self.world = replace(problem, world=world), world.with_test_of(problem)
+        self._objective = Objective.of(self._problem, settings, self.world.field)
         self._map_time = self._clock.elapsed
         self._clock.restart()
         self._clock.reserve = min(AUDIT_SHARE * settings.planning_time, MOST_FOR_AUDIT)
@@ -109,7 +109,7 @@ class _Call:
         stops = list(_stops(self._problem, self._waypoints))
         if len(stops) < 3:
             return self._single_leg(stops)
-        if not self._world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
+        if not self.world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
             return self._leave_start(stops)
         if unreachable := self._without_room(stops):
             return unreachable
@@ -138,11 +138,11 @@ class _Call:
         occupied = self._leg_plan(self._leg(*stops[:2]))
         if occupied.status != Status.START_OCCUPIED:
             return self._no_way(stops[1], occupied)
-        departure = find_departure(self._problem, self._world, occupied.message, self._clock.check)
+        departure = find_departure(self._problem, self.world, occupied.message, self._clock.check)
         if departure.path is None:
             return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
         passed = len(stops[0].waypoints)
-        whole = WholePlans(self._problem, self._settings, departure, self._world, self._clock)
+        whole = WholePlans(self._problem, self._settings, departure, self.world, self._clock)
         rest = plan_through(whole.rest, self._waypoints[passed:], replace(self._settings, planning_time=whole.time_for_rest),
                             cancel=self._cancel)
         answer = whole.joined(rest)
@@ -153,7 +153,7 @@ class _Call:
     def _without_room(self, stops: list[_Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
         for n, stop in enumerate(stops):
-            room = [pose for pose in stop.poses if self._world.field.pose_is_free(pose, self._problem.vehicle)]
+            room = [pose for pose in stop.poses if self.world.field.pose_is_free(pose, self._problem.vehicle)]
             if not room:
                 before, after = stops[max(n, 1) - 1:max(n, 1) + 1]
                 return self._no_way(after, self._leg_plan(self._leg(before, after)))
@@ -161,7 +161,7 @@ class _Call:
         return None
 
     def _leg(self, here: _Stop, there: _Stop) -> Leg:
-        return Leg(here.poses, there.poses, self._world.field, self._problem.vehicle)
+        return Leg(here.poses, there.poses, self.world.field, self._problem.vehicle)
 
     # Headings
 
@@ -194,7 +194,7 @@ class _Call:
 
     def _explore(self, leg: Leg) -> None:
         """Look for paths of a leg between several headings at its ends; where none is found so, plan it."""
-        to_end = CostToGo(self._world.field, self._problem.vehicle.inscribed_radius, leg.ends[0][:2])
+        to_end = CostToGo(self.world.field, self._problem.vehicle.inscribed_radius, leg.ends[0][:2])
         starts, ends = (poses[::max(1, len(poses) // FIRST_HEADINGS)] for poses in (leg.starts, leg.ends))
         pairs = [(start, leg.ends) for start in starts] + [(starts[0], [end]) for end in ends if len(ends) > 1]
         drafts = [self._draft(leg, start, some, to_end) for start, some in pairs]
@@ -207,8 +207,8 @@ class _Call:
 
     def _draft(self, leg: Leg, start: Pose, ends: Sequence[Pose], to_end: CostToGo | None = None) -> bool:
         """Add the path to the leg that hybrid A* finds with little work, from a start to one end or to any; return True if so."""
-        problem = Problem(self._world, start=start, goal=ends[0], any_goal_heading=len(ends) > 1)
-        field, vehicle = self._world.field, self._problem.vehicle
+        problem = Problem(self.world, start=start, goal=ends[0], any_goal_heading=len(ends) > 1)
+        field, vehicle = self.world.field, self._problem.vehicle
         runs = HybridAStarRuns(problem, self._settings, field, to_end or CostToGo.to_goal(problem, field))
         path, left = None, DRAFT_EXPANSIONS
         while path is None and left > 0 and not runs.exhausted and not self._clock.poll():
@@ -224,7 +224,7 @@ class _Call:
     def _leg_plan(self, leg: Leg) -> Plan:
         """Plan a leg from its first start to its end."""
         settings = replace(self._settings, samples=1, planner="rrt", planning_time=self._time(0.5))
-        problem = Problem(self._world, start=leg.starts[0], goal=leg.ends[0], any_goal_heading=len(leg.ends) > 1)
+        problem = Problem(self.world, start=leg.starts[0], goal=leg.ends[0], any_goal_heading=len(leg.ends) > 1)
         return plan(problem, settings, cancel=self._cancel)
 
     def _time(self, share: float) -> float:
@@ -246,11 +246,11 @@ class _Call:
     def _smoothed(self, path: Path) -> Path:
         if _is_shortest(path) or self._clock.is_over:
             return path
-        return smooth(path, self._problem.vehicle, self._world.field, self._rng, False, self._clock.poll, self._objective)
+        return smooth(path, self._problem.vehicle, self.world.field, self._rng, False, self._clock.poll, self._objective)
 
     def _with_best_heading(self, before: Path, after: Path, most: float) -> list[Path]:
         """Return two legs with the heading between them that makes them cheapest, of those up to `most` [rad] off the present."""
-        arriving, leaving = (KnownPath(path, self._world.field, self._problem.vehicle) for path in (before, after))
+        arriving, leaving = (KnownPath(path, self.world.field, self._problem.vehicle) for path in (before, after))
         x, y, theta = after.start
         poses = [(x, y, heading) for heading in wrap(theta + np.linspace(-most, most, TRIES)).tolist()]
         off, onto = arriving.off(poses), leaving.onto(poses)
@@ -272,7 +272,7 @@ class _Call:
         for left, n in zip(range(len(some), 0, -1), some, strict=True):
             if self._clock.poll():
                 break
-            problem = Problem(self._world, start=paths[n].start, goal=paths[n].end)
+            problem = Problem(self.world, start=paths[n].start, goal=paths[n].end)
             if n == last:
                 problem = replace(self._problem, start=paths[n].start)
             settings = replace(self._settings, samples=max(1, self._settings.samples // len(some)),
@@ -314,7 +314,7 @@ class _Call:
     def _audit(self, path: Path) -> Audit:
         """Audit the path of all legs, and keep as much time for the next audit."""
         began = self._clock.elapsed
-        audit = audit_path(path, self._problem, self._world.obstacles, self._clock.check)
+        audit = audit_path(path, self._problem, self.world.obstacles, self._clock.check)
         self._clock.reserve = AUDIT_RESERVE * (self._clock.elapsed - began)
         return Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
 

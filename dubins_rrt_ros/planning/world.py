@@ -8,7 +8,9 @@ import numpy as np
 from .audit.obstacles import Obstacles, obstacles_of
 from .collision.clearance import ClearanceField
 from .collision.footprint import cover
+from .collision.own_test import OwnTest
 from .maps.model import GridMap, Map
+from .problem import Problem
 from .vehicle import Vehicle
 
 
@@ -49,11 +51,27 @@ class World:
         """
         return prepare(new_map, self.vehicle, self.allow_unknown, self)
 
+    def with_test_of(self, problem: Problem) -> "World":
+        """Return this world for a problem with an `is_free`, which its collision checkers ask too; else this world itself."""
+        known = self.field.own_test
+        if problem.is_free is None or (known and known.is_free is problem.is_free):
+            return self
+        other = World(self.map, self.vehicle, self.allow_unknown)
+        other.field = self.field.with_own_test(OwnTest(problem.is_free, problem.fine_spacing))
+        other.obstacles = self.obstacles
+        return other
+
     def __reduce__(self) -> tuple[Any, ...]:
         return World, (self.map, self.vehicle, self.allow_unknown)
 
     def __repr__(self) -> str:
         return f"World(map={self.map.name!r}, vehicle={self.vehicle}, allow_unknown={self.allow_unknown})"
+
+
+def world_of(problem: Problem) -> World:
+    """Return the world of a problem, without its `is_free`; one is prepared where it has none."""
+    world = problem.world
+    return world if isinstance(world, World) else prepare(problem.map, problem.vehicle, problem.allow_unknown)
 
 
 def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A002 - a public name

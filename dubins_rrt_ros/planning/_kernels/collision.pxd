@@ -23,3 +23,8 @@ cdef class PolygonChecker(CollisionChecker):
     cdef double speed(self, double radius, int turn) noexcept nogil
     cdef double straight_is_free(self, Pose pose, double length, double walked) noexcept nogil
     cdef double turn_is_free(self, Pose pose, double radius, int turn, double length, double walked) noexcept nogil
+
+@cython.final
+cdef class TestedChecker(CollisionChecker):
+    cdef CollisionChecker checker
+    cdef object test

@@ -209,3 +209,34 @@ class PolygonChecker(CollisionChecker):
                                                  ahead * cos_theta, ahead * sin_theta, self.spans):
                 return False
         return True
+
+
+@cython.final
+@cython.cclass
+class TestedChecker(CollisionChecker):
+    """A checker that asks a test in Python too where another checker finds the vehicle free.
+
+    It takes the interpreter's lock for that. The test must not raise.
+    """
+
+    def __init__(self, checker: CollisionChecker, test):
+        """Make the checker of another one and a test: `pose_is_free(x, y, theta)`, and `motion_is_free` with what follows."""
+        CollisionChecker.__init__(self, checker.clearance, checker.required_clearance)
+        self.checker, self.test = checker, test
+
+    def pose_is_free(self, pose):
+        """Return whether both find the vehicle free at a pose."""
+        free: cython.bint = self.checker.pose_is_free(pose)
+        if free:
+            with cython.gil:
+                free = self.test.pose_is_free(pose.x, pose.y, pose.theta)
+        return free
+
+    def motion_is_free(self, pose, radius, curve):
+        """Return whether both find the vehicle free along a curve."""
+        free: cython.bint = self.checker.motion_is_free(pose, radius, curve)
+        if free:
+            with cython.gil:
+                free = self.test.motion_is_free(pose.x, pose.y, pose.theta, radius, curve.word, curve.first, curve.second,
+                                                curve.third)
+        return free

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..hooks import are_free
 from ..problem import Pose, Problem, Waypoint
 from .departure import judge_clearance
 from .obstacles import Obstacles
@@ -69,7 +70,7 @@ def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = Non
     else:
         too_near, least = clearance_findings(arcs, problem, obstacles=obstacles, check_time=check_time)
     findings = (*_start_findings(path, problem), *goal_findings(path.end, problem), *_joint_findings(path, starts, ends),
-                *turn_findings(path.curves, problem), *too_near)
+                *turn_findings(path.curves, problem), *too_near, *_test_findings(path, problem))
     bends = (abs(arc.curvature) for curve in path.curves for arc in curve.arcs if arc.length > 0)
     return Audit(findings, least, max(bends, default=0.0))
 
@@ -135,6 +136,17 @@ def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[
     if not findings and not (total_off <= CREEP + rounding and total_turned <= CREEP):
         findings.append(f"at its joints the path jumps by {total_off:.6g} m and {total_turned:.6g} rad in all")
     return findings
+
+
+def _test_findings(path: "Path", problem: Problem) -> Iterator[str]:
+    """Yield a sentence for the first pose of the path that a test of the user's refuses, where it is asked in the search too."""
+    if problem.is_free is None:
+        return
+    poses = path.poses(problem.fine_spacing)
+    refused = np.flatnonzero(~are_free(problem.is_free, poses))
+    if len(refused):
+        x, y, theta = poses[refused[0]]
+        yield f"is_free refuses the path at ({x:.3f}, {y:.3f}, {theta:.3f})"
 
 
 def passing_findings(path: "Path", waypoints: Sequence[Waypoint]) -> Iterator[str]:

@@ -17,17 +17,19 @@ from scipy import ndimage
 
 from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
-from .._kernels.collision import CollisionChecker, PolygonChecker
+from .._kernels.collision import CollisionChecker, PolygonChecker, TestedChecker
 from .._kernels.components import label_components
 from .._kernels.cost_to_go import find_free_squares, free_squares, greatest_clearances
 from .._kernels.eikonal import node_slowness
 from .._kernels.room import CornerIndex, FootprintRoom, Room
 from ..curves.dubins import DubinsCurve
+from ..curves.path import Path
 from ..maps.frame import Frame
 from ..maps.model import GridMap, Map
 from ..problem import Pose
 from ..vehicle import Vehicle
 from .footprint import cover
+from .own_test import OwnTest
 from .raster import CLEARANCE_MARGIN, grid_clearance, grid_corners, polygon_clearance
 
 #: Side of the buckets of obstacles' corners, in cells of the raster.
@@ -60,6 +62,7 @@ class ClearanceField:
     Attributes:
         kernel: the compiled distances, for the planner's inner loop; its raster holds a lower bound for each cell.
         frame: the frame of the raster, whose origin is the corner of its first cell.
+        own_test: a test of the user's for further obstacles, which the collision checkers ask too, or None.
     """
 
     def __init__(self, world_map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
@@ -69,6 +72,7 @@ class ClearanceField:
         computed; the result is the same as without it, and the previous field stays as it is.
         """
         self.kernel: GridClearance | PolygonClearance
+        self.own_test: OwnTest | None = None
         self._forget()
         if isinstance(world_map, GridMap):
             similar = previous.kernel if previous and isinstance(previous.kernel, GridClearance) else None
@@ -104,6 +108,21 @@ class ClearanceField:
         other._forget()
         return other
 
+    def with_own_test(self, own_test: OwnTest) -> "ClearanceField":
+        """Return the same distances, with collision checkers that ask a test of the user's too."""
+        other = copy.copy(self)
+        other.own_test = own_test
+        return other
+
+    def test_accepts(self, path: Path) -> bool:
+        """Return False where a test of the user's refuses a path, as it is cut into curves; the checkers judge single curves."""
+        return self.own_test is None or self.own_test.path_is_free(path)
+
+    def raise_test_error(self) -> None:
+        """Raise the exception of a test of the user's, if it raised one."""
+        if self.own_test:
+            self.own_test.raise_error()
+
     def at(self, points: np.ndarray) -> np.ndarray:
         """Return the exact clearance at (..., 2) points [m]: 0 in obstacles and outside the map, in polygons too."""
         points = np.asarray(points, dtype=float)
@@ -115,6 +134,10 @@ class ClearanceField:
 
     def collision_checker(self, vehicle: Vehicle) -> CollisionChecker:
         """Return the checker of a vehicle's motions on the map, for one thread."""
+        checker = self._checker_of_map(vehicle)
+        return TestedChecker(checker, self.own_test) if self.own_test else checker
+
+    def _checker_of_map(self, vehicle: Vehicle) -> CollisionChecker:
         if not vehicle.footprint:
             return CollisionChecker(clearance=self.kernel, required_clearance=vehicle.robot_radius)
         found = cover(vehicle.footprint)

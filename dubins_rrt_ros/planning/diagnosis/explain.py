@@ -77,6 +77,17 @@ def before_search(problem: Problem, field: ClearanceField, check_time: Callable[
             return _diagnosis(occupied, *_overlapping(problem, field, name, pose), problem, field)
     if are_separated(problem, field):
         return Diagnosis(Status.NO_VALID_PATH, *_separated(problem, field, check_time))
+    return _refused_by_test(problem, field)
+
+
+def _refused_by_test(problem: Problem, field: ClearanceField) -> Diagnosis | None:
+    """Return that a test of the user's refuses the start, or an exact goal, if so."""
+    ends = [("Start", problem.start, Status.START_OCCUPIED)] + [("Goal", problem.goal, Status.GOAL_OCCUPIED)] * problem.exact_goal
+    for name, pose, occupied in ends:
+        if field.own_test and not field.own_test.pose_is_free(*pose):
+            x, y, theta = pose
+            message = f"{name} is occupied: is_free refuses ({x:.3f}, {y:.3f}, {theta:.3f}); move it, or check is_free."
+            return _diagnosis(occupied, message, (x, y), problem, field)
     return None
 
 

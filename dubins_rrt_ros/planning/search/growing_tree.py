@@ -81,8 +81,8 @@ class GrowingTree:
 
     def insert_if_better(self, path: Path | None, found_by: str) -> None:
         """Add a path to the goal to the tree, if it is the best."""
-        if path is not None and self.objective.path_cost(path) < self.cost:
-            self._insert(path, self.best if self._exact_goal else -1)
+        end = self.best if self._exact_goal else -1
+        if path is not None and self.objective.path_cost(path) < self.cost and self._insert(path, end):
             self.found_by = found_by
 
     def insert_smoothed(self, path: Path) -> None:
@@ -90,11 +90,14 @@ class GrowingTree:
         if self.objective.path_cost(path) < self.cost:
             self._insert(path, self.best)
 
-    def _insert(self, path: Path, end: int) -> None:
-        """Add a path to the tree; `end` is the node at its end, or -1 where the tree has none."""
+    def _insert(self, path: Path, end: int) -> bool:
+        """Add a path to the tree, unless a test of the user's refuses it; `end` is the node at its end, or -1 for none."""
         pieces = path.cut(self._step)
+        if not self.objective.field.test_accepts(pieces):
+            return False
         self._kernel.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
         self.best = self._kernel.best_goal_node()
+        return True
 
     def limit_to_best(self, bounds: CostBounds, from_start: CostToGo) -> None:
         """Add only what can be on a cheaper path than the best from now on, and forget other nodes."""

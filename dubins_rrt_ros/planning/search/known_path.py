@@ -36,7 +36,8 @@ class KnownPath:
     """A path, cut into pieces, with curves onto it and off it. That the pieces are free is left to `joined`."""
 
     def __init__(self, path: Path, field: ClearanceField, vehicle: Vehicle):
-        self._path = path.cut(SPACING * vehicle.turning_radius)
+        pieces = path.cut(SPACING * vehicle.turning_radius)
+        self._path = pieces if field.test_accepts(pieces) else path
         self._radius = vehicle.turning_radius
         self._along = np.append(0.0, np.cumsum(lengths_of(self._path.lengths[1:])))
         self._checker = field.collision_checker(vehicle)

@@ -160,13 +160,18 @@ class Search:
 
     def simplified(self, path: Path) -> Path:
         """Return a path with fewer curves, at hardly more cost; the same where the cost is the length."""
-        return self._smoother.simplify(path).cut(self._settings.step_size)
+        return self._accepted(self._smoother.simplify(path), path)
 
     def without_short_arcs(self, path: Path) -> Path:
         """Return a path with its short arcs merged, as far as there is time; the same where paths are not smoothed."""
         if not self._settings.shortcut:
             return path
-        return merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll).cut(self._settings.step_size)
+        return self._accepted(merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll), path)
+
+    def _accepted(self, simple: Path, path: Path) -> Path:
+        """Return the simpler form of a path, cut as the settings ask for, unless a test of the user's refuses it."""
+        pieces = simple.cut(self._settings.step_size)
+        return pieces if self.objective.field.test_accepts(pieces) else path
 
     def tree_with(self, path: Path) -> Tree:
         """Return a copy of the tree, with a path that is not the best as a branch of its own."""

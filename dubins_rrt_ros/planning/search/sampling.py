@@ -8,6 +8,7 @@ import numpy as np
 from ..collision.clearance import ClearanceField
 from ..curves.angles import wrap
 from ..curves.path import Path
+from ..hooks import draw_poses
 from ..problem import Problem
 from ..settings import Settings
 from .cost import Objective
@@ -50,6 +51,14 @@ class Sampler:
         Args:
             from_start, best: bounds of the costs from the start, and the best path so far; the samples are informed by both.
         """
+        sampler = self._settings.sampler
+        poses = draw_poses(sampler, self._rng, count) if sampler else self._own_draw(count, from_start, best)
+        at_goal = np.flatnonzero(self._rng.random(count) < self._settings.goal_bias)
+        poses[at_goal] = self._goals(len(at_goal))
+        return poses
+
+    def _own_draw(self, count: int, from_start: CostToGo | None, best: Path | None) -> np.ndarray:
+        """Draw (count, 3) poses as the settings say, none of them at the goal on purpose."""
         poses = np.empty((count, 3))
         if from_start and best:
             poses[:, :2] = self._where_cheaper(count, from_start, self._objective.path_cost(best))
@@ -59,8 +68,6 @@ class Sampler:
         if from_start and best:
             near = np.flatnonzero(self._rng.random(count) < NEAR_SHARE)
             poses[near] = self._near(best, len(near))
-        at_goal = np.flatnonzero(self._rng.random(count) < self._settings.goal_bias)
-        poses[at_goal] = self._goals(len(at_goal))
         return poses
 
     def _anywhere(self, count: int) -> np.ndarray:

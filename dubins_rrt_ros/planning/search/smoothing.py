@@ -55,7 +55,8 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
             shortcutter.improve(draws, begin, tried, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
     waypoints, words, lengths = (np.array(view[:shortcutter.count])
                                  for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
-    return Path(waypoints, words, lengths, path.radius)
+    smoothed = Path(waypoints, words, lengths, path.radius)
+    return smoothed if field.test_accepts(smoothed) else path
 
 
 class Smoother:
