@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
-from dubins_rrt_ros.cli.bench import deadlines
+from dubins_rrt_ros.cli.bench import deadlines, latencies
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.planning import PolygonMap, Problem, Settings, Vehicle, load_map, plan, rasterise, save_map
 from dubins_rrt_ros.planning.maps.locate import maps_directory
@@ -271,3 +271,29 @@ def test_deadlines_are_measured_on_maps_of_its_own(monkeypatch, capsys):
 def test_deadlines_take_no_problems(capsys):
     file = problems(entry())
     assert "--deadlines has problems of its own" in refusal(file, "--deadlines", "--out", "runs.jsonl", capsys=capsys)
+
+
+@pytest.mark.slow
+def test_the_node_is_measured_over_topics_each_answer_a_line(monkeypatch, capsys):
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE"):
+        monkeypatch.setenv(name, "")
+    monkeypatch.setattr(latencies, "IDLE", 1.0)
+    block = entry(name="block", map=str(maps_directory() / "block.yaml"), start=[2, 3, 1.57], goal=[6, 4, 0], turning_radius=0.5)
+    lines = bench(problems(block), "--node", "--seeds", "2", "--samples", "50")
+    kinds = [line["measured"] for line in lines]
+    assert len(lines) == latencies.number_of_lines([block], 2)
+    assert kinds[:11] == ["goal"] * 2 + ["start moved"] * 2 + ["get_plan"] * 2 + ["map window"] * 2 + ["equal map"] * 2 + ["idle"]
+    assert all(line["wall_s"] > 0 and line["cpu_s"] > 0 for line in lines)
+    assert {line["error_name"] for line in lines[:8]} == {"NONE"}
+    assert all(line["over_s"] == line["wall_s"] - line["planning_time"] and line["poses"] > 1 for line in lines[4:6])
+    assert lines[6]["map_id"] != lines[7]["map_id"]
+    assert all(0 < line["share"] < 1 for line in lines[10:])
+    table = capsys.readouterr().out
+    assert "| block | goal | 2 |" in table and "of a core" in table
+
+
+def test_the_node_needs_ros(monkeypatch, capsys):
+    monkeypatch.setattr("dubins_rrt_ros.cli.demo.process.importlib.util.find_spec", lambda name: None)
+    assert main(["bench", problems(entry()), "--node", "--out", "runs.jsonl"]) == 1
+    assert "pip install 'dubins_rrt_ros[ros]'" in capsys.readouterr().err

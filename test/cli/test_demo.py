@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from dubins_rrt_ros.cli.demo import command as demo
 from dubins_rrt_ros.cli.demo import process as planner_process
 from dubins_rrt_ros.cli.main import main
 
@@ -48,7 +47,7 @@ def test_a_node_that_dies_is_told_in_one_line(tmp_path, monkeypatch, environment
 
 
 def test_without_ros_the_remedy_is_told_in_one_line(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(demo.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(planner_process.importlib.util, "find_spec", lambda name: None)
     assert main(["demo", "--plot", str(tmp_path / "demo.png")]) == 1
     error = capsys.readouterr().err
     assert "pip install 'dubins_rrt_ros[ros]'" in error and error.count("\n") == 1

@@ -3,7 +3,8 @@
 import argparse
 import contextlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from ..common.flags import add_option_flags, add_paper_flag, given_settings, lar
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
-from . import deadlines
+from ..demo.process import DemoError
+from . import deadlines, latencies
 from .problems import Case, chosen, read_cases
 from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
@@ -40,7 +42,7 @@ class _Flags(Settings):
 def add_arguments(parser: Parser) -> None:
     """Give the parser the flags and the help of the command."""
     describe(
-        parser, usage="(PROBLEMS.json --out FILE | --deadlines --out FILE | --report FILE [FILE ...]) [options]",
+        parser, usage="(PROBLEMS.json [--node] --out FILE | --deadlines --out FILE | --report FILE [FILE ...]) [options]",
         description="Plans every problem of a file with several seeds and writes a line of JSON for each run, as soon as it is "
                     "done; or, with --report, compares the runs in such files.",
         notes="Without --samples the time ends a run, with --samples alone the samples do, so that seed and budget determine "
@@ -72,10 +74,16 @@ def _add_measuring(group: argparse._ArgumentGroup) -> None:
                        help=f"time limit of a run [s]; default {DEFAULT_TIME:g}, or none if --samples is given")
     group.add_argument("--jobs", metavar="N", type=int,
                        help="number of processes; default 1, since processes that share cores distort each other's timings")
-    group.add_argument("--deadlines", action="store_true",
-                       help="measure in place of PROBLEMS.json by how much answers exceed planning times of 0.05 to 1 s: a disc, "
-                            "a star of 100 corners and a truck in the maze, in halls and among blocks, with goals that can be "
-                            f"reached and goals that cannot; --seeds N requests each, default {deadlines.REQUESTS}")
+    others = group.add_mutually_exclusive_group()
+    others.add_argument("--node", action="store_true",
+                        help="measure the node in place of the library, over real topics: goal to first path, get_plan, a start "
+                             f"that moved, maps that change, and what it takes when idle; --seeds N requests each, default "
+                             f"{latencies.REQUESTS}")
+    others.add_argument("--deadlines", action="store_true",
+                        help="measure in place of PROBLEMS.json by how much answers exceed planning times of 0.05 to 1 s: a "
+                             "disc, a star of 100 corners and a truck in the maze, in halls and among blocks, with goals that "
+                             "can be reached and goals that cannot; --seeds N requests each, default "
+                             f"{deadlines.REQUESTS}")
     group.add_argument("--label", metavar="NAME", help="name of these runs in a report; default: the planner")
 
 
@@ -117,13 +125,10 @@ def _flags(names: Iterable[str]) -> str:
 def _measure(arguments: argparse.Namespace) -> int:
     if getattr(arguments, "deadlines", False):
         return _measure_deadlines(arguments)
+    if getattr(arguments, "node", False):
+        return _measure_node(arguments)
     planned, jobs = _planned_runs(arguments), _count(arguments, "jobs")
-    lines = []
-    with open(arguments.out, "w", encoding="utf-8") as out, contextlib.closing(measure_all(planned, jobs)) as measured:
-        for line in with_bar(measured, len(planned), " runs"):
-            out.write(json.dumps(line, allow_nan=False) + "\n")
-            out.flush()
-            lines.append(line)
+    lines = _written(arguments.out, measure_all(planned, jobs), len(planned))
     runs = grouped(map(parse_record, lines))
     _write_json(arguments.json, runs, best_known(runs, {}))
     print(summary(runs), file=words_for(arguments.json))
@@ -136,26 +141,53 @@ def _measure_deadlines(arguments: argparse.Namespace) -> int:
         raise UsageError("--deadlines has problems of its own, so leave PROBLEMS.json out; --out must be given")
     count = _count(arguments, "seeds", default=deadlines.REQUESTS)
     asked = deadlines.requests(count, _settings(arguments, {"samples": Settings.samples}))
-    lines = []
-    with open(arguments.out, "w", encoding="utf-8") as out:
-        for line in with_bar(deadlines.measure(asked), deadlines.number_of_requests(count), " requests"):
-            out.write(json.dumps(line, allow_nan=False) + "\n")
-            lines.append(line)
+    lines = _written(arguments.out, deadlines.measure(asked), deadlines.number_of_requests(count))
     if arguments.json:
         write_document(arguments.json, {"overruns": lines})
     print(deadlines.overruns(lines), file=words_for(arguments.json))
     return 0
 
 
+def _measure_node(arguments: argparse.Namespace) -> int:
+    """Time the answers of the node, and print how soon they come."""
+    cases, count = _cases(arguments), _count(arguments, "seeds", default=latencies.REQUESTS)
+    settings = Settings(**given_settings(arguments, _Flags))
+    if "time" in arguments:
+        settings = replace(settings, planning_time=arguments.time)
+    try:
+        lines = _written(arguments.out, latencies.measure(cases, settings, count), latencies.number_of_lines(cases, count))
+    except DemoError as error:
+        print(f"dubins_rrt bench: error: {error}", file=sys.stderr)
+        return 1
+    if arguments.json:
+        write_document(arguments.json, {"latencies": lines})
+    print(latencies.latencies(lines), file=words_for(arguments.json))
+    return 0
+
+
+def _written(file: str, measured: Generator[dict[str, Any], None, None], count: int) -> list[dict[str, Any]]:
+    """Write lines of JSON as they come, and return them."""
+    lines = []
+    with open(file, "w", encoding="utf-8") as out, contextlib.closing(measured):
+        for line in with_bar(measured, count, " requests"):
+            out.write(json.dumps(line, allow_nan=False) + "\n")
+            out.flush()
+            lines.append(line)
+    return lines
+
+
 def _planned_runs(arguments: argparse.Namespace) -> list[BenchRun]:
     """List the runs, those of a problem after each other."""
+    return [run for case in _cases(arguments) for run in _runs_of(case, arguments)]
+
+
+def _cases(arguments: argparse.Namespace) -> list[Case]:
+    """Read the problems that are asked for."""
     missing = [name for name, key in (("PROBLEMS.json", "file"), ("--out", "out")) if key not in arguments]
     if missing:
         raise UsageError(f"{' and '.join(missing)} must be given, to measure; or --report, to compare")
     cases = read_cases(arguments.file)
-    if "problems" in arguments:
-        cases = chosen(cases, arguments.problems.split(","))
-    return [run for case in cases for run in _runs_of(case, arguments)]
+    return chosen(cases, arguments.problems.split(",")) if "problems" in arguments else cases
 
 
 def _runs_of(case: Case, arguments: argparse.Namespace) -> Iterator[BenchRun]:

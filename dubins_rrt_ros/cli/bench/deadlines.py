@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -139,7 +139,7 @@ def _blocks() -> GridMap:
 _MAPS: Mapping[str, Callable[[], GridMap]] = {"maze": _maze, "halls": _halls, "blocks": _blocks}
 
 
-def measure(asked: Iterable[Request]) -> Iterator[dict[str, Any]]:
+def measure(asked: Iterable[Request]) -> Generator[dict[str, Any], None, None]:
     """Plan each request, and yield by how much it took longer than its limit, in wall time and in CPU time of this thread [s]."""
     for name, problem, settings in asked:
         wall, cpu = time.perf_counter(), time.thread_time()

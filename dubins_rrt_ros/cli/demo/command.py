@@ -1,24 +1,17 @@
 """`dubins_rrt demo`: start the installed node, send it a start and a goal over topics, receive the path and draw it."""
 
 import argparse
-import contextlib
-import importlib.util
-import os
-import signal
 import sys
-import tempfile
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Vehicle
 from dubins_rrt_ros.planning.maps.locate import maps_directory
-from dubins_rrt_ros.planning.text import install_command
 
 from ..common.example import GOAL, MAP, START
 from ..common.output import check_drawing, check_folder, words_for, write_document
 from ..common.parser import Parser, add_json_flag, describe
-from .process import DemoError, PlannerProcess
+from .process import DemoError, enter_domain, running_planner
 
 if TYPE_CHECKING:
     from .client import Answer
@@ -64,28 +57,12 @@ def _demonstrate() -> tuple["Answer", int]:
     Raises:
         DemoError: there is no answer.
     """
-    if importlib.util.find_spec("rclpy") is None:
-        raise DemoError(f"ROS 2 is not here (no module rclpy); run: {install_command('ros')}")
-    # A domain of its own, and this machine alone: no robot nearby may receive the goal.
-    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    enter_domain()
     from .client import DemoClient
-    with _planner() as planner:
+    with running_planner(PARAMETERS | {"map_file": maps_directory() / f"{MAP}.yaml"}) as planner:
         with DemoClient(planner.check) as client:
             answer = client.ask(START, GOAL, PARAMETERS)
         return answer, planner.stop()
-
-
-@contextlib.contextmanager
-def _planner() -> Iterator[PlannerProcess]:
-    # SIGTERM ends this process as Ctrl-C does, so that no node is left behind.
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        planner = PlannerProcess(PARAMETERS | {"map_file": maps_directory() / f"{MAP}.yaml"}, log)
-        try:
-            yield planner
-        finally:
-            planner.stop()
-            signal.signal(signal.SIGTERM, before)
 
 
 def _report(answer: "Answer") -> str:

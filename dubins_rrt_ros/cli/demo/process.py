@@ -1,21 +1,25 @@
 """The installed planner node as a process, and the command that starts it."""
 
+import contextlib
+import importlib.util
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from dubins_rrt_ros.planning.maps.locate import PACKAGE, ament_prefixes
+from dubins_rrt_ros.planning.text import install_command
 
 #: Time limit for the node to stop [s].
 STOP_TIME = 10.0
 
 
 class DemoError(Exception):
-    """A failure of the demonstration; the message says where, and what to do."""
+    """A failure of the node or its client; the message says where, and what to do."""
 
 
 class PlannerProcess:
@@ -33,6 +37,12 @@ class PlannerProcess:
         if status is not None:
             raise DemoError(f"the node ended with exit status {status}: {self._last_line()}")
 
+    @property
+    def cpu_time(self) -> float:
+        """The CPU time that all its threads have used [s]."""
+        tasks = Path(f"/proc/{self._process.pid}/task").iterdir()
+        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
+
     def stop(self) -> int:
         """End the node as Ctrl-C does, and return its exit status."""
         if self._process.poll() is None:
@@ -47,6 +57,31 @@ class PlannerProcess:
         self._log.seek(0)
         lines = [line for line in self._log.read().splitlines() if line.strip()]
         return lines[-1] if lines else "it said nothing"
+
+
+def enter_domain() -> None:
+    """Let this process and its children hear nobody but each other: no robot nearby may receive a goal.
+
+    Raises:
+        DemoError: ROS is not here.
+    """
+    if importlib.util.find_spec("rclpy") is None:
+        raise DemoError(f"ROS 2 is not here (no module rclpy); run: {install_command('ros')}")
+    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 101), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+@contextlib.contextmanager
+def running_planner(parameters: Mapping[str, Any]) -> Iterator[PlannerProcess]:
+    """Run the node with these parameters."""
+    # SIGTERM ends this process as Ctrl-C does, so that no node is left behind.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+        planner = PlannerProcess(parameters, log)
+        try:
+            yield planner
+        finally:
+            planner.stop()
+            signal.signal(signal.SIGTERM, before)
 
 
 def planner_command() -> list[str]:
