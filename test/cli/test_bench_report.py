@@ -1,5 +1,6 @@
 """`dubins_rrt bench --report`, by numbers computed by hand."""
 
+import csv
 import json
 import math
 from pathlib import Path
@@ -71,13 +72,14 @@ def test_quantiles_are_values_that_were_measured(values, quarter, half, three_qu
 def test_a_problem_has_medians_and_quartiles_over_all_its_runs():
     rows, text = report(write(RUNS))
     assert rows["yard", "planner"] == [
-        "solved", "first path [ms]", "its cost", "cost at 0.05 s", "cost at 0.1 s", "cost at 0.3 s", "cost at 1 s",
+        "solved", "first path [ms]", "its cost", "cost at 0.05 s", "cost at 0.1 s", "cost at 0.3 s", "cost at 1 s", "final cost",
         "5 % above best [ms]", "2 % above best [ms]", "1 % above best [ms]"]
     # 10.5, 10.2 and 10.1 m are aimed at; within 5 % are the runs after 200, 250 and 800 ms, within 2 % after 200 and 500.
     assert rows["yard", "a"] == ["3/4", "40 [20, 60]", "16.00", "20.00", "16.00", "10.50", "10.15 [10.00, 10.40]",
-                                 "250", "500", "-"]
-    assert rows["yard", "b"] == ["2/2", "10 [10, 30]", "11.00", "11.00", "11.00", "11.00", "11.00 [11.00, 11.00]", "-", "-", "-"]
-    assert rows["pond", "b"] == ["0/1", *["-"] * 9]
+                                 "10.15 [10.00, 10.40]", "250", "500", "-"]
+    assert rows["yard", "b"] == ["2/2", "10 [10, 30]", "11.00", "11.00", "11.00", "11.00", *["11.00 [11.00, 11.00]"] * 2,
+                                 "-", "-", "-"]
+    assert rows["pond", "b"] == ["0/1", *["-"] * 10]
     assert "Best known: 10.0000 m, the best of these runs, of a with seed 0." in text
 
 
@@ -126,7 +128,7 @@ def test_what_runs_cut_short_would_have_had_is_not_guessed():
 
 def test_marks_end_with_the_longest_run():
     rows, _ = report(write([run("yard", "rrt", 0, (0.01, 14), time_limit=5, total_s=0.02)]))
-    assert rows["yard", "planner"][3:5] == ["cost at 0.05 s", "5 % above best [ms]"]
+    assert rows["yard", "planner"][3:6] == ["cost at 0.05 s", "final cost", "5 % above best [ms]"]
 
 
 def test_without_a_file_the_report_is_printed(capsys):
@@ -134,6 +136,30 @@ def test_without_a_file_the_report_is_printed(capsys):
     for flags in ([], ["--out", "-"]):
         assert main(["bench", "--report", "runs.jsonl", *flags]) == 0
         assert capsys.readouterr().out == text
+
+
+def test_a_report_as_csv_has_the_figures_of_the_json():
+    assert main(["bench", "--report", write(RUNS), "--out", "report.CSV", "--json", "report.json"]) == 0
+    with Path("report.CSV").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    results = json.loads(Path("report.json").read_text())["results"]
+    assert [(row["problem"], row["planner"]) for row in rows] == [("yard", "a"), ("yard", "b"), ("pond", "a"), ("pond", "b")]
+    for row, result in zip(rows, results, strict=True):
+        figures = {"final_cost_median": result["final_cost"]["median"], "cost_at_0.3_median": result["cost_at"]["0.3"]["median"],
+                   "time_to_within_0.02": result["time_to_within"]["0.02"], "solved": result["solved"]}
+        assert {name: row[name] for name in figures} == {name: "" if value is None else str(value)
+                                                         for name, value in figures.items()}
+
+
+def test_a_report_as_latex_has_the_cells_of_the_markdown():
+    runs = write([*RUNS, run("a & b_c", "50 % {x}~^\\$#", 0, (0.1, 9))])
+    rows, _ = report(runs)
+    assert main(["bench", "--report", runs, "--out", "report.tex"]) == 0
+    text = Path("report.tex").read_text()
+    assert text.count(r"\begin{tabular}{lrrrrrrrrrrr}") == 3 and text.count(r"\bottomrule") == 4
+    assert " & ".join(["a", *rows["yard", "a"]]) + r" \\" in text.splitlines()
+    assert r"\caption{a \& b\_c. Best known: 9.0000 m" in text
+    assert r"50 \% \{x\}\textasciitilde{}\textasciicircum{}\textbackslash{}\$\# & 1/1" in text
 
 
 @pytest.mark.parametrize(("text", "says"), [

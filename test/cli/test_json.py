@@ -107,7 +107,8 @@ def test_demo_writes_what_it_received(monkeypatch, capsys):
     assert f"{document['length']:.2f} m, {len(document['poses'])} poses" in out
     assert document["poses"][0] == pytest.approx(document["start"]) and document["poses"][-1] == pytest.approx(document["goal"])
     length = sum(math.dist(a[:2], b[:2]) for a, b in zip(document["poses"], document["poses"][1:], strict=False))
-    assert document["length"] == pytest.approx(length, rel=1e-3) and document["lower_bound"] <= document["length"]
+    assert document["length"] == document["path_length"] == pytest.approx(length, rel=1e-3)
+    assert document["lower_bound"] <= document["length"]
     assert document["gap"] == pytest.approx(document["length"] / document["lower_bound"] - 1, rel=1e-3)
     assert document["samples"] > 0 and document["settings"]["planner"] == "rrt_star" and document["time_to_first"] > 0
 

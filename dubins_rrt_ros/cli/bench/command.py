@@ -18,6 +18,7 @@ from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
 from ..demo.process import DemoError
 from . import deadlines, latencies
+from .formats import write_report
 from .problems import Case, chosen, read_cases
 from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
@@ -55,8 +56,9 @@ def add_arguments(parser: Parser) -> None:
                   "dubins_rrt bench --report ours.jsonl plain.jsonl --plot report.png"],
         exit_status="0 all runs solved or a report, 1 some run unsolved, 2 wrong usage, 130 interrupted")
     parser.argument_default = argparse.SUPPRESS
-    parser.add_argument("--out", metavar="FILE", help="where to write: the lines of JSON; with --report the report as Markdown, "
-                                                      "which goes to standard output otherwise")
+    parser.add_argument("--out", metavar="FILE", help="where to write: the lines of JSON; with --report the report, as "
+                                                      "Markdown, or as CSV or LaTeX where the name ends with .csv or .tex; "
+                                                      "default of a report: Markdown to standard output")
     add_json_flag(parser, "what the runs amount to")
     _add_measuring(parser.add_argument_group("measuring"))
     add_option_flags(parser, "settings", _Flags)
@@ -224,11 +226,10 @@ def _report(given: dict[str, Any]) -> int:
         from .plots import draw_sample_costs
         draw_sample_costs(given["plot_samples"], runs)
     _write_json(given["json"], runs, best)
-    text = to_markdown(runs, best)
     if given.get("out", STDOUT) == STDOUT:
-        print(text, end="", file=words_for(given["json"]))
+        print(to_markdown(runs, best), end="", file=words_for(given["json"]))
     else:
-        Path(given["out"]).write_text(text, encoding="utf-8")
+        write_report(given["out"], runs, best)
     return 0
 
 

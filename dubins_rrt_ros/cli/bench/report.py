@@ -1,18 +1,19 @@
-"""The report of `dubins_rrt bench`: statistics of runs, as Markdown and as JSON.
+"""The report of `dubins_rrt bench`: statistics of runs, as tables of text and as a document for JSON.
 
 Medians and quartiles are the smallest value that at least this share of the runs does not exceed: each is a measured value.
 Runs without a path that passed its check count as infinite.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 from .records import Best, RunRecord, Runs
 
 #: Times at which costs are compared [s], and excesses over the best known cost whose times are.
 MARKS, EXCESSES = (0.05, 0.1, 0.3, 1.0, 5.0), (0.05, 0.02, 0.01)
 
+TITLE = "Planners compared"
 EXPLANATION = """\
 Lengths are in metres; times count from the request on, with the map prepared. Each figure is the lower median over all runs of a
 planner, in brackets the quartiles: values that were measured. A run is solved where its path passed its check; the others count
@@ -68,13 +69,29 @@ def _reasons(group: list[RunRecord]) -> list[str]:
     return [f"  {reason}" for reason in reversed(first.values())]
 
 
-def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
-    """Write the report in Markdown: all problems in one table, then a table for each."""
+class Section(NamedTuple):
+    """A section of the report: a text, and a table whose first column has names."""
+
+    title: str
+    text: str
+    head: list[str]
+    rows: list[list[str]]
+
+
+def sections(runs: Runs, best: Mapping[str, Best]) -> Iterator[Section]:
+    """Yield the sections of the report: all problems in one table, then a table for each."""
     marks = marks_of(runs)
-    parts = ["# Planners compared", EXPLANATION.strip(), "## All problems", _overview(runs, best, marks)]
+    yield _overview(runs, best, marks)
     for problem, planners in runs.items():
-        parts += [f"## {problem}", f"Best known: {metres(best[problem].cost, 4)} m, {best[problem].source}.",
-                  _problem_table(planners, best[problem], marks)]
+        known = f"Best known: {metres(best[problem].cost, 4)} m, {best[problem].source}."
+        yield Section(problem, known, *_problem_table(planners, best[problem], marks))
+
+
+def to_markdown(runs: Runs, best: Mapping[str, Best]) -> str:
+    """Write the report in Markdown."""
+    parts = [f"# {TITLE}", EXPLANATION.strip()]
+    for section in sections(runs, best):
+        parts += [f"## {section.title}", section.text, table(section.head, section.rows)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -115,12 +132,12 @@ def _mean(values: Iterable[float]) -> dict[str, float]:
     return {"geometric_mean": mean, "problems": len(finite)}
 
 
-def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> str:
+def _overview(runs: Runs, best: Mapping[str, Best], marks: list[float]) -> Section:
     names = dict.fromkeys(planner for planners in runs.values() for planner in planners)
     head = ["planner", "solved runs", "problems solved in the median", "first path [ms]",
             *(f"cost / best known at {mark:g} s" for mark in marks)]
     note = "The last columns are geometric means over the problems, of medians; (k/n): only k of the n problems have one."
-    return note + "\n\n" + table(head, [_overview_row(name, runs, best, marks) for name in names])
+    return Section("All problems", note, head, [_overview_row(name, runs, best, marks) for name in names])
 
 
 def _overview_row(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> list[str]:
@@ -138,10 +155,11 @@ def _shown(mean: Mapping[str, float], problems: int, show: Callable[[float], str
     return text if mean["problems"] == problems else f"{text} ({mean['problems']}/{problems})"
 
 
-def _problem_table(planners: Mapping[str, list[RunRecord]], best: Best, marks: list[float]) -> str:
-    head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks),
+def _problem_table(planners: Mapping[str, list[RunRecord]], best: Best, marks: list[float]
+                   ) -> tuple[list[str], list[list[str]]]:
+    head = ["planner", "solved", "first path [ms]", "its cost", *(f"cost at {mark:g} s" for mark in marks), "final cost",
             *(f"{100 * share:g} % above best [ms]" for share in EXCESSES)]
-    return table(head, [_problem_row(planner, _figures(group, best, marks)) for planner, group in planners.items()])
+    return head, [_problem_row(planner, _figures(group, best, marks)) for planner, group in planners.items()]
 
 
 def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
@@ -149,7 +167,7 @@ def _problem_row(planner: str, figures: Mapping[str, Any]) -> list[str]:
     return [planner, _share(figures), _with_quartiles(figures["time_to_first"], milliseconds),
             metres(figures["first_cost"]["median"]),
             *(metres(costs["median"]) for costs in early), _with_quartiles(last, metres),
-            *map(milliseconds, figures["time_to_within"].values())]
+            _with_quartiles(figures["final_cost"], metres), *map(milliseconds, figures["time_to_within"].values())]
 
 
 def with_quartiles(values: list[float], show: Callable[[float], str]) -> str:

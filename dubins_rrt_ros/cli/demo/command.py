@@ -77,8 +77,8 @@ def _report(answer: "Answer") -> str:
 
 def _document(answer: "Answer") -> dict[str, Any]:
     """Return the answer as JSON holds it, by the names of a plan's file."""
-    figures = dict(answer.figures)
-    return {"length": figures.pop("path_length"), **figures, "samples": int(figures["samples"]),
+    figures = answer.figures
+    return {"length": figures["path_length"], **figures, "samples": int(figures["samples"]),
             "tree_nodes": int(figures["tree_nodes"]), "poses": answer.path.tolist(), "start": START, "goal": GOAL,
             "settings": PARAMETERS, "version": __version__}
 
