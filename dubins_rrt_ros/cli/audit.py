@@ -18,6 +18,7 @@ from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
 from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request
 from dubins_rrt_ros.planning.result import pose_spacing
 from dubins_rrt_ros.planning.text import one_line, quoted
+from dubins_rrt_ros.planning.world import problem_with_costs
 
 from .common.documents import read_poses_or_json
 from .common.example import ENDS, MAP
@@ -124,6 +125,7 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
     given, of_request = given_options(arguments, Vehicle), given_options(arguments, Problem)
     replaced = {name: value for flag in given for name, value in _OVERRIDES.get(flag, {}).items()}
     problem = replace(problem, vehicle=Vehicle(**values(problem.vehicle) | replaced | given), **_ends(arguments), **of_request)
+    problem = problem_with_costs(problem, settings)
     found = audit_path(path, problem)
     # With other things than it was planned with its clearance is another.
     others = ["min_clearance"] if given or of_request or arguments.any_map else []
@@ -137,7 +139,8 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
 
 
 def _cost(path: Path, problem: Problem, settings: Settings) -> float:
-    return cost_of(path, problem, settings.preferred_clearance_of(problem.vehicle), settings.clearance_weight)
+    return cost_of(path, problem, settings.preferred_clearance_of(problem.vehicle), settings.clearance_weight,
+                   settings.weight_of_cells)
 
 
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:

@@ -67,7 +67,8 @@ class Maps:
         self._came_by_topic = False
         self._worker = Worker("maps")
         self._world: futures.Future[World] = futures.Future()  # of the newest map
-        self._world_is_of: tuple[Map, float, bool] | None = None  # map, required clearance and allow_unknown
+        # Map, required clearance, allow_unknown, and whether cells have costs.
+        self._world_is_of: tuple[Map, float, bool, bool] | None = None
         self._world_is_wanted = False  # by a request, whatever map comes next
         self._publisher = node.create_publisher(OccupancyGrid, "map", LATCHED) if self._options.map_file else None
         if self._options.map_file:
@@ -100,11 +101,12 @@ class Maps:
         if self.map is not None:
             now = self._parameters.read()
             allow_unknown = now.problem["allow_unknown"]
-            wanted = self.map, now.vehicle.required_clearance, allow_unknown
+            has_costs = now.settings.weight_of_cells > 0
+            wanted = self.map, now.vehicle.required_clearance, allow_unknown, has_costs
             if self._world_is_of != wanted:
                 self._renew_world()
                 self._world_is_of = wanted
-                self._worker.submit(partial(self._prepare, self._world, self.map, now.vehicle, allow_unknown),
+                self._worker.submit(partial(self._prepare, self._world, self.map, now.vehicle, allow_unknown, has_costs),
                                     partial(self._post, self._end_preparation))
         return self._world
 
@@ -114,10 +116,11 @@ class Maps:
         self._world, self._world_is_wanted = futures.Future(), False
 
     def _prepare(self, world: "futures.Future[World]", world_map: Map, vehicle: Vehicle, allow_unknown: bool,
-                 cancelled: Callable[[], bool]) -> World | None:
+                 has_costs: bool, cancelled: Callable[[], bool]) -> World | None:
         if not world.set_running_or_notify_cancel():
             return None
         try:
+            world_map = world_map.with_costs(has_costs)
             world_map.id  # noqa: B018 - takes long for a large map, and is kept
             self.prepared = prepare(world_map, vehicle, allow_unknown, self.prepared)
         except Exception as error:

@@ -107,7 +107,8 @@ class PlanRequest:
         """
         route = self._route(cancelled)
         problem = self.problem(route.start, route.goal)
-        problem = replace(problem, world=self.world.result().for_vehicle(problem.vehicle))
+        world = self.world.result().for_vehicle(problem.vehicle)
+        problem = replace(problem, map=world.map, world=world)
         throttle = _Throttle(IMPROVEMENT_INTERVAL)
 
         def on_progress(progress: Progress) -> None:

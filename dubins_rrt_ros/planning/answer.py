@@ -9,6 +9,7 @@ from .curves.path import Path
 from .diagnosis import explain
 from .problem import Problem
 from .result import gap_above
+from .search.cost import minimises_length
 from .search.tree import Tree
 from .settings import Settings
 
@@ -77,7 +78,7 @@ def not_audited_message(path: Path) -> str:
 
 def _above_the_least(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], proved: str) -> str:
     """Return how far the path is above the shortest, or the cheapest, possible at most."""
-    if settings.preferred_clearance_of(problem.vehicle) > 0:
+    if not minimises_length(problem, settings):
         gap = gap_above(bounds[1], answer.cost)
         cost = f" with a cost of {answer.cost:.2f} m"
         return cost + (f", at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else "")

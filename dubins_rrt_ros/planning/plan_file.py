@@ -19,7 +19,7 @@ from .text import quoted, quoted_name
 from .vehicle import Vehicle
 
 #: Settings that a document of an earlier version lacks, as that version planned.
-BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0}
+BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0, "cost_weight": 0.0}
 
 #: Keys of the functions that a document names.
 HOOKS = ("is_free", "sampler")

@@ -29,7 +29,7 @@ from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
 from .settings import Settings
-from .world import World, world_of
+from .world import World, problem_with_costs, world_of
 
 #: Maximum time between two reports of progress [s].
 REPORT_INTERVAL = 0.05
@@ -165,6 +165,7 @@ class _Call:
     def _prepared_world(self) -> World:
         """Return the problem's world, or prepare one; the request's own time begins when it is ready."""
         _keep_freed_memory()
+        self._problem = problem_with_costs(self._problem, self._settings)
         world = world_of(self._problem).with_test_of(self._problem)
         if own_test := world.field.own_test:
             self._own_test, self._deadline.cancel = own_test, own_test.cancel(self._deadline.cancel)

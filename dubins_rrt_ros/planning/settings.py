@@ -48,6 +48,10 @@ class Settings:
         "path, -1 is the inscribed radius; without effect with informed: false", unit="m", low=-1.0, high=1000.0)
     clearance_weight: float = option(2.0, "extra cost of a metre in contact: a metre costs 1 + clearance_weight * "
                                      "(1 - room / preferred_clearance)^2", low=0.0, high=100.0)
+    cost_weight: float = option(
+        0.0, "extra cost of a metre over a cell of 100 %; above 0 a grid's cells between free_thresh and occupied_thresh are "
+        "free, and a metre over one of c % costs cost_weight * c / 100 more; 0 leaves them unknown, and so does informed: false",
+        low=0.0, high=1000.0)
     path_spacing: float = option(0.0, "maximum distance between two poses of a published path; 0 is the smaller of a cell (of a "
                                  "polygon map a quarter of the inscribed radius) and a tenth of the turning radius, and at least "
                                  "0.01", unit="m", low=0.0, high=1000.0)
@@ -72,6 +76,11 @@ class Settings:
         if not self.informed or self.clearance_weight == 0:
             return 0.0
         return vehicle.inscribed_radius if self.preferred_clearance == -1 else self.preferred_clearance
+
+    @property
+    def weight_of_cells(self) -> float:
+        """The extra cost of a metre over a cell of 100 %; 0 where cells between the thresholds are unknown."""
+        return self.cost_weight if self.informed else 0.0
 
     @classmethod
     def paper(cls, **others: Any) -> "Settings":

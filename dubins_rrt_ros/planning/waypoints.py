@@ -33,7 +33,7 @@ from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
-from .world import world_of
+from .world import problem_with_costs, world_of
 
 #: Number of headings that are tried at a waypoint.
 HEADINGS = 72
@@ -91,6 +91,7 @@ class _Call:
                  on_progress: Callable[[Progress], None] | None):
         self._waypoints, self._settings, self._cancel, self._on_progress = waypoints, settings, cancel, on_progress
         self._clock = Deadline(settings.planning_time, cancel)
+        problem = problem_with_costs(problem, settings)
         world = world_of(problem)
         self._problem, self.world = replace(problem, world=world), world.with_test_of(problem)
         self._objective = Objective.of(self._problem, settings, self.world.field)

@@ -1,5 +1,6 @@
 """A world: what depends on map, vehicle and the use of unknown space alone, computed once for many requests."""
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +12,7 @@ from .collision.footprint import cover
 from .collision.own_test import OwnTest
 from .maps.model import GridMap, Map
 from .problem import Problem
+from .settings import Settings
 from .vehicle import Vehicle
 
 
@@ -61,6 +63,15 @@ class World:
         other.obstacles = self.obstacles
         return other
 
+    def with_costs(self, has_costs: bool) -> "World":
+        """Return the world of `GridMap.with_costs`: this one where that makes no difference, else another, which is kept."""
+        return self if self.map.with_costs(has_costs) is self.map else self._with_other_costs
+
+    @cached_property
+    def _with_other_costs(self) -> "World":
+        other = self.map.with_costs(self.map.costs is None)
+        return prepare(other, self.vehicle, self.allow_unknown)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return World, (self.map, self.vehicle, self.allow_unknown)
 
@@ -94,6 +105,20 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
         cover(vehicle.footprint)
     world.obstacles  # noqa: B018 - computed now
     return world
+
+
+def problem_with_costs(problem: Problem, settings: Settings) -> Problem:
+    """Return a problem as the settings take it: with cells between the thresholds free, at a cost, or unknown.
+
+    Its world, where it has one, is prepared for that.
+    """
+    has_costs = settings.weight_of_cells > 0
+    if problem.map.with_costs(has_costs) is problem.map:
+        return problem
+    if not isinstance(problem.world, World):
+        return replace(problem, map=problem.map.with_costs(has_costs), world=None)
+    world = problem.world.with_costs(has_costs)
+    return replace(problem, map=world.map, world=world)
 
 
 def _reuse(world: World, previous: World) -> None:

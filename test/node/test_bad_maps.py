@@ -180,6 +180,21 @@ def test_probabilities_are_free_and_occupied_by_thresholds_that_can_be_set(on_ot
     assert client.set_parameters(occupied_thresh=0.65, free_thresh=0.25).successful
 
 
+def test_cells_between_the_thresholds_are_free_at_a_cost_where_that_is_asked_for(on_other_maps):
+    """The costmap of an inflation layer: 100 is lethal, 99 and less are costs."""
+    client = on_other_maps.client
+    data = np.full((100, 100), 99, np.int8)
+    data[0, 0] = 100
+    take(on_other_maps, changed(data=array.array("b", data.tobytes())))
+    assert client.set_parameters(occupied_thresh=0.995, free_thresh=0.0).successful
+    assert_says(on_other_maps.plan(START, GOAL)[0], "205", "START_OCCUPIED", "a cell of 99 %")
+    assert client.set_parameters(cost_weight=2.0).successful
+    told, _ = on_other_maps.plan(START, GOAL)
+    assert told["error_name"] == "NONE" and float(told["cost"]) == pytest.approx(2.98 * float(told["path_length"]), rel=1e-3)
+    assert client.set_parameters(cost_weight=0.0, occupied_thresh=0.65, free_thresh=0.25).successful
+    assert_says(on_other_maps.plan(START, GOAL)[0], "205", "START_OCCUPIED", "an obstacle, a cell of 99 %")
+
+
 @pytest.mark.parametrize("message", [changed(width=1, height=1, data=cells(1)), changed(data=array.array("b", [100] * 10_000)),
                                      changed(data=array.array("b", [-1] * 10_000)),
                                      changed(width=20_000, height=1, data=cells(20_000))],

@@ -1,13 +1,18 @@
 cimport cython
+from dubins_rrt_ros.planning._kernels.cell_costs cimport CellCosts
 from dubins_rrt_ros.planning._kernels.dubins cimport Curve, Pose
 from dubins_rrt_ros.planning._kernels.room cimport Room
 
 @cython.final
 cdef class EdgeCost:
     cdef readonly bint is_length
+    cdef bint has_room
+    cdef bint has_cells
     cdef Room room
+    cdef CellCosts cells
     cdef readonly double preferred_clearance
     cdef readonly double weight
+    cdef readonly double cell_weight
     # The arc under way.
     cdef Pose pose
     cdef double room_here

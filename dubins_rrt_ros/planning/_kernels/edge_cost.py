@@ -3,22 +3,25 @@
 
 The cost of a metre is
 
-    1 + w max(0, 1 - room / p)^2,
+    1 + w max(0, 1 - room / p)^2 + v c,
 
 where `room` is the distance from the vehicle's outline to the nearest obstacle, p the preferred clearance and w its weight: 1 in
-the open, 1 + w in contact. The cost of an edge is the integral of that along its curve; with p = 0 it is the length. Every search
-minimises the sum of the costs of a path's edges. Pruning requires that an edge cost at least its length: only then are the Dubins
-length, the straight line and the way around the obstacles lower bounds of the cost.
+the open, 1 + w in contact. c is the cost of the grid's cell under the reference point, from 0 to 1, and v the weight of that.
+The cost of an edge is the integral of all this along its curve; it is the length with p = 0 and without cells that cost. Every
+search minimises the sum of the costs of a path's edges. Pruning requires that an edge cost at least its length: only then are
+the Dubins length, the straight line and the way around the obstacles lower bounds of the cost.
 
-The integral. Where the room exceeds p, the curve is free of extra cost for as far as it takes to lose what is above p, since the
-room changes by at most a metre per metre that the fastest point of the vehicle moves. Elsewhere pieces are integrated by
-Simpson's rule over their halves, and halved until it differs little from the rule over the whole: the room has kinks where
-another obstacle becomes the nearest. A search finds whatever makes its costs too low, so each piece has to be right by itself.
+The integral over cells is exact. As to the room: where it exceeds p, the curve is free of extra cost for as far as it takes to
+lose what is above p, since the room changes by at most a metre per metre that the fastest point of the vehicle moves. Elsewhere
+pieces are integrated by Simpson's rule over their halves, and halved until it differs little from the rule over the whole: the
+room has kinks where another obstacle becomes the nearest. A search finds whatever makes its costs too low, so each piece has to
+be right by itself.
 """
 
 import cython
 
 if cython.compiled:
+    from cython.cimports.dubins_rrt_ros.planning._kernels.cell_costs import CellCosts
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import (
         UNLIMITED,
         Curve,
@@ -34,6 +37,7 @@ if cython.compiled:
 else:
     from math import ceil, cos, fabs, sin
 
+    from .cell_costs import CellCosts
     from .dubins import UNLIMITED, Curve, Pose, arc_length, drive, drive_from, length_of, turn_of
     from .room import Room
 
@@ -54,12 +58,16 @@ class EdgeCost:
     Attributes:
         is_length: whether the cost is the length.
         preferred_clearance, weight: p [m] and w.
+        cell_weight: v.
     """
 
-    def __init__(self, room: Room = None, preferred_clearance: cython.double = 0, weight: cython.double = 0):
-        """Prepare the costs; `room` is the vehicle's, and may be left out where the others are 0."""
-        self.is_length = preferred_clearance == 0 or weight == 0
+    def __init__(self, room: Room = None, preferred_clearance: cython.double = 0, weight: cython.double = 0,
+                 cells: CellCosts = None, cell_weight: cython.double = 0):
+        """Prepare the costs; `room` is the vehicle's, and may be left out where p or w is 0, as `cells` may where v is."""
+        self.has_room, self.has_cells = preferred_clearance > 0 and weight > 0, cell_weight > 0
+        self.is_length = not self.has_room and not self.has_cells
         self.room, self.preferred_clearance, self.weight = room, preferred_clearance, weight
+        self.cells, self.cell_weight = cells, cell_weight
 
     def of(self, pose, radius, curve, limit):
         """Return the cost of driving a free curve from a pose [m], or a lower bound of it that is at least `limit`."""
@@ -68,6 +76,7 @@ class EdgeCost:
             return length
         cost: cython.double = length
         arc: cython.int
+        turn: cython.int
         self.radius = radius
         self.room_here = UNKNOWN
         for arc in range(3):
@@ -75,9 +84,13 @@ class EdgeCost:
                 break
             length = arc_length(curve, arc)
             if length > 0:
-                self.begin_arc(pose, turn_of(curve.word, arc))
-                cost += self.excess_of_arc(length, limit - cost)
-                pose = drive(pose, radius, self.turn, length)
+                turn = turn_of(curve.word, arc)
+                if self.has_room:
+                    self.begin_arc(pose, turn)
+                    cost += self.excess_of_arc(length, limit - cost)
+                if self.has_cells and cost < limit:
+                    cost += self.cell_weight * self.cells.integral(pose, radius, turn, length, (limit - cost) / self.cell_weight)
+                pose = drive(pose, radius, turn, length)
         return cost
 
     def begin_arc(self, pose, turn):

@@ -1,4 +1,4 @@
-"""The cost of a path by the audit's own measure: points close together, and distances to the obstacles' true shapes."""
+"""The cost of a path by the audit's own measure: points close together, distances to the obstacles' true shapes, and cells."""
 
 import math
 from collections.abc import Callable
@@ -17,36 +17,84 @@ if TYPE_CHECKING:
 
 #: Distance between the points, in preferred clearances, and their maximum number.
 SPACING, MOST_POINTS = 1 / 64, 1_000_000
+#: Size of the pieces that a path over cells with costs is cut into, in cells, and number of parts of one that leaves its cell.
+CELL_PIECE, CELL_PARTS = 1 / 8, 64
 #: Relative error of a cost that is claimed and right: that of the planner's integrals, and that of these.
 COST_ERROR = 1.5e-3
 #: Number of points that are measured at once.
 AT_ONCE = 2048
 
 
-def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: float, obstacles: Obstacles | None = None,
-            check_time: Callable[[], None] = any_time) -> float:
-    """Return the cost of a path that is free [m]: the integral of 1 + weight * max(0, 1 - room / preferred_clearance)^2.
+def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: float, cell_weight: float = 0.0,
+            obstacles: Obstacles | None = None, check_time: Callable[[], None] = any_time) -> float:
+    """Return the cost of a path that is free [m].
+
+    It is the integral of 1 + weight * max(0, 1 - room / preferred_clearance)^2 + cell_weight * (the cost of the cell) / 100.
 
     Args:
         path: its curves can be driven.
         problem: with map and vehicle.
-        preferred_clearance, weight: of the cost; 0 makes it the length [m].
+        preferred_clearance, weight: of the cost of clearance, which there is none of where one of them is 0 [m].
+        cell_weight: of the costs of the grid's cells, where it has any.
         obstacles: those of the problem's map, where they are at hand.
         check_time: called every few milliseconds; what it raises ends the audit.
     """
-    if preferred_clearance == 0 or weight == 0 or not path.curves:
-        return path.length
+    cost = path.length
+    if not path.curves:
+        return cost
     arcs = driven_arcs(path.curves, path.start)[2]
+    if preferred_clearance > 0 and weight > 0:
+        cost += weight * _crowding(arcs, problem, preferred_clearance, obstacles, check_time)
+    if cell_weight > 0 and isinstance(problem.map, GridMap) and problem.map.costs is not None:
+        cost += cell_weight * _over_cells(arcs, problem.map, check_time)
+    return cost
+
+
+def _crowding(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None,
+              check_time: Callable[[], None]) -> float:
+    """Return the integral of max(0, 1 - room / preferred_clearance)^2 [m]."""
     index, begin, size = arcs.pieces(max(SPACING * preferred_clearance, float(arcs.length.sum()) / MOST_POINTS))
     x, y, theta = arcs.at(index, begin + size / 2)
     vehicle, inset = _vehicle(problem, preferred_clearance, obstacles, arcs, check_time)
-    cost = 0.0
+    integral = 0.0
     for first in range(0, len(x), AT_ONCE):
         check_time()
         some = slice(first, first + AT_ONCE)
         room = vehicle.clearance(x[some], y[some], theta[some]) - inset
-        cost += float((size[some] * (1 + weight * np.maximum(0, 1 - room / preferred_clearance)**2)).sum())
-    return cost
+        integral += float((size[some] * np.maximum(0, 1 - room / preferred_clearance)**2).sum())
+    return integral
+
+
+def _over_cells(arcs: Arcs, grid: GridMap, check_time: Callable[[], None]) -> float:
+    """Return the integral of the costs of the cells under the reference point, as shares of 100 % [m]."""
+    index, begin, size = arcs.pieces(max(CELL_PIECE * grid.resolution, float(arcs.length.sum()) / MOST_POINTS))
+    integral, parts = 0.0, (np.arange(CELL_PARTS) + 0.5) / CELL_PARTS
+    for first in range(0, len(index), AT_ONCE):
+        check_time()
+        some = slice(first, first + AT_ONCE)
+        arc, start, long = index[some], begin[some], size[some]
+        stays = _cell_at(grid, arcs, arc, start) == _cell_at(grid, arcs, arc, start + long)
+        integral += float((long * _shares(grid, _cell_at(grid, arcs, arc, start + long / 2)))[stays].sum())
+        arc, start, long = (array[~stays, None] for array in (arc, start, long))
+        arc = np.broadcast_to(arc, (len(arc), CELL_PARTS))
+        integral += float((long / CELL_PARTS * _shares(grid, _cell_at(grid, arcs, arc, start + long * parts))).sum())
+    return integral
+
+
+def _cell_at(grid: GridMap, arcs: Arcs, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return the cells at arc lengths, as complex numbers column + i row."""
+    x, y, _ = arcs.at(index, s)
+    place = (x - grid.origin[0] + 1j * (y - grid.origin[1])) * np.exp(-1j * grid.origin[2]) / grid.resolution
+    cells: np.ndarray = np.floor(place.real) + 1j * np.floor(place.imag)
+    return cells
+
+
+def _shares(grid: GridMap, cells: np.ndarray) -> np.ndarray:
+    """Return the costs of cells as shares of 100 %."""
+    assert grid.costs is not None
+    rows, columns = grid.costs.shape
+    row, column = (np.clip(part.astype(int), 0, count - 1) for part, count in ((cells.imag, rows), (cells.real, columns)))
+    return np.asarray(grid.costs[row, column] / 100.0)
 
 
 def _vehicle(problem: Problem, reach: float, obstacles: Obstacles | None, arcs: Arcs, check_time: Callable[[], None]

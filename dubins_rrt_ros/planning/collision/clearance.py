@@ -28,6 +28,7 @@ from ..maps.frame import Frame
 from ..maps.model import GridMap, Map
 from ..problem import Pose
 from ..vehicle import Vehicle
+from .cell_costs import CostCells
 from .footprint import cover
 from .own_test import OwnTest
 from .raster import CLEARANCE_MARGIN, grid_clearance, grid_corners, polygon_clearance
@@ -63,6 +64,7 @@ class ClearanceField:
         kernel: the compiled distances, for the planner's inner loop; its raster holds a lower bound for each cell.
         frame: the frame of the raster, whose origin is the corner of its first cell.
         own_test: a test of the user's for further obstacles, which the collision checkers ask too, or None.
+        cost_cells: the cells of the grid, where some of them have costs; else None.
     """
 
     def __init__(self, world_map: Map, allow_unknown: bool = False, previous: "ClearanceField | None" = None):
@@ -73,6 +75,7 @@ class ClearanceField:
         """
         self.kernel: GridClearance | PolygonClearance
         self.own_test: OwnTest | None = None
+        self.cost_cells = CostCells.of(world_map, allow_unknown) if isinstance(world_map, GridMap) else None
         self._forget()
         if isinstance(world_map, GridMap):
             similar = previous.kernel if previous and isinstance(previous.kernel, GridClearance) else None
@@ -88,7 +91,7 @@ class ClearanceField:
     def _forget(self) -> None:
         self._components: tuple[float, np.ndarray] | None = None
         self._free_squares: tuple[float, FreeSquares] | None = None
-        self._slowness: dict[bool, tuple[tuple[float, float, float], tuple[np.ndarray, np.ndarray]]] = {}
+        self._slowness: dict[bool, tuple[tuple[float, ...], tuple[np.ndarray, np.ndarray]]] = {}
 
     def _take_over(self, previous: "ClearanceField", columns: list[slice]) -> None:
         """Take over from another field the components, if no columns differ, and the free squares of those that do not."""
@@ -235,7 +238,7 @@ class ClearanceField:
         cells = _cells_of_square(shape, SQUARE_SHARE * required_clearance / self.kernel.resolution)
         return FreeSquares(cells, free_squares(self.kernel, cells, required_clearance))
 
-    def slowness(self, required_clearance: float, preferred_clearance: float, weight: float, is_bound: bool
+    def slowness(self, required_clearance: float, preferred_clearance: float, weight: float, cell_weight: float, is_bound: bool
                  ) -> tuple[np.ndarray, np.ndarray]:
         """Return what a metre costs in each of the `free_squares`, and at least at each of their nodes.
 
@@ -243,17 +246,21 @@ class ClearanceField:
 
         Args:
             required_clearance: radius of the largest disc around the reference point in the vehicle [m].
-            preferred_clearance, weight: of the cost, as `_kernels/edge_cost.py` says [m].
+            preferred_clearance, weight, cell_weight: of the cost, as `_kernels/edge_cost.py` says [m].
             is_bound: True for lower bounds in a square, False for estimates.
         """
-        key = required_clearance, preferred_clearance, weight
+        key = required_clearance, preferred_clearance, weight, cell_weight
         kept = self._slowness.get(is_bound)
         if kept is None or kept[0] != key:
             cells, squares = self.free_squares(required_clearance)
-            clearances = greatest_clearances(self.kernel, cells, squares, required_clearance + preferred_clearance,
-                                             *((BOUND_PARTS, 0.5) if is_bound else (ESTIMATE_PARTS, 0.0)))
-            room = np.maximum(clearances - required_clearance, 0)
-            of_squares = 1 + weight * np.maximum(0, 1 - room / preferred_clearance)**2
+            of_squares = np.ones(squares.shape)
+            if weight > 0:
+                clearances = greatest_clearances(self.kernel, cells, squares, required_clearance + preferred_clearance,
+                                                 *((BOUND_PARTS, 0.5) if is_bound else (ESTIMATE_PARTS, 0.0)))
+                room = np.maximum(clearances - required_clearance, 0)
+                of_squares = 1 + weight * np.maximum(0, 1 - room / preferred_clearance)**2
+            if self.cost_cells and cell_weight > 0:
+                of_squares[1:-2, 1:-2] += cell_weight * self.cost_cells.of_squares(cells, is_bound)
             self._slowness[is_bound] = kept = key, (of_squares, node_slowness(squares, of_squares))
         return kept[1]
 

@@ -28,10 +28,12 @@ class Thresholds(NamedTuple):
     Attributes:
         free_up_to: maximum value of a free cell [%].
         occupied_from: minimum value of an occupied cell [%]; between the two a cell is unknown.
+        between_is_free: True if cells between the two are free, and have a cost, their value.
     """
 
     free_up_to: int = 25
     occupied_from: int = 65
+    between_is_free: bool = False
 
     @classmethod
     def of_fractions(cls, free_thresh: float, occupied_thresh: float) -> "Thresholds":
@@ -40,13 +42,21 @@ class Thresholds(NamedTuple):
 
     def meaning(self, value: int) -> str:
         """Return what a cell's value means: free, occupied or unknown."""
-        return "occupied" if value >= self.occupied_from else "free" if 0 <= value <= self.free_up_to else "unknown"
+        return "occupied" if value >= self.occupied_from else "free" if 0 <= value <= self._greatest_free else "unknown"
+
+    @property
+    def _greatest_free(self) -> int:
+        return self.occupied_from - 1 if self.between_is_free else self.free_up_to
 
     def blocked(self, data: np.ndarray, allow_unknown: bool) -> np.ndarray:
         """Return (height, width) bool: which cells of a grid's data are obstacles."""
         if allow_unknown:
             return np.asarray(data >= self.occupied_from)
-        return np.asarray((data > self.free_up_to) | (data < 0))
+        return np.asarray((data > self._greatest_free) | (data < 0))
+
+    def between(self, data: np.ndarray) -> np.ndarray:
+        """Return (height, width) bool: which cells of a grid's data are neither free nor occupied by the two limits."""
+        return np.asarray((data > self.free_up_to) & (data < self.occupied_from))
 
 
 DEFAULT_THRESHOLDS = Thresholds()
@@ -149,6 +159,27 @@ class GridMap(_PlottableMap):
         return GridMap(self.data[low:int(row) + cells + 1, left:int(column) + cells + 1], self.resolution,
                        (*corner, self.origin[2]), self.name, percent=True, thresholds=self.thresholds)
 
+    def with_costs(self, has_costs: bool) -> "GridMap":
+        """Return the map with its cells between the thresholds free at a cost, or else unknown; the same if it is so."""
+        if has_costs == self.thresholds.between_is_free or not self._has_cells_between:
+            return self
+        return self._with_other_costs
+
+    @cached_property
+    def _with_other_costs(self) -> "GridMap":
+        return self.with_thresholds(self.thresholds._replace(between_is_free=not self.thresholds.between_is_free))
+
+    @cached_property
+    def _has_cells_between(self) -> bool:
+        return bool(self.thresholds.between(self.data).any())
+
+    @cached_property
+    def costs(self) -> np.ndarray | None:
+        """(height, width) uint8: the costs of the cells [%], read-only; None where no cell has one."""
+        if not (self.thresholds.between_is_free and self._has_cells_between):
+            return None
+        return _read_only(np.where(self.thresholds.between(self.data), self.data, 0).astype(np.uint8))
+
     def with_thresholds(self, thresholds: Thresholds) -> "GridMap":
         """Return the map with the same cells, whose values are taken otherwise."""
         return replace(self, percent=True, thresholds=thresholds)
@@ -165,7 +196,8 @@ class GridMap(_PlottableMap):
     @cached_property
     def id(self) -> str:
         """A short digest of the content."""
-        unusual = () if self.thresholds == DEFAULT_THRESHOLDS else (self.thresholds,)
+        limits = self.thresholds[:2]
+        unusual = () if limits == DEFAULT_THRESHOLDS[:2] else (limits,)
         return _digest(self.data.tobytes(), repr((self.data.shape, self.resolution, self.origin, *unusual)).encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -185,6 +217,13 @@ class PolygonMap(_PlottableMap):
 
     free: shapely.Geometry
     name: str = field(default="polygons", kw_only=True)
+
+    #: The costs of cells: polygons have none.
+    costs = None
+
+    def with_costs(self, has_costs: bool) -> "PolygonMap":
+        """Return this map."""
+        return self
 
     def __post_init__(self) -> None:
         _check_name(self.name)

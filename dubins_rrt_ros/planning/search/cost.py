@@ -14,35 +14,40 @@ from ..vehicle import Vehicle
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """The cost that is minimised: the length, or one that rises where the vehicle has less room than it prefers.
+    """The cost that is minimised: the length, or one that rises where the vehicle has less room than it prefers, or cells cost.
 
     Attributes:
         vehicle, field: the vehicle, and the clearance of the map.
         preferred_clearance: room from which on a metre costs a metre [m]; 0 makes the cost the length.
         weight: what a metre in contact costs above its length [m].
+        cell_weight: what a metre over a cell of 100 % costs above its length [m].
     """
 
     vehicle: Vehicle
     field: ClearanceField
     preferred_clearance: float = 0.0
     weight: float = 0.0
+    cell_weight: float = 0.0
 
     @classmethod
     def of(cls, problem: Problem, settings: Settings, field: ClearanceField) -> "Objective":
         """Return what the settings ask for."""
         preferred = settings.preferred_clearance_of(problem.vehicle)
-        return cls(problem.vehicle, field, preferred, settings.clearance_weight if preferred > 0 else 0.0)
+        return cls(problem.vehicle, field, preferred, settings.clearance_weight if preferred > 0 else 0.0,
+                   settings.weight_of_cells if field.cost_cells else 0.0)
 
     @property
     def is_length(self) -> bool:
         """True if the cost is the length."""
-        return self.preferred_clearance == 0 or self.weight == 0
+        return (self.preferred_clearance == 0 or self.weight == 0) and self.cell_weight == 0
 
     def edge_cost(self) -> EdgeCost:
         """Return the kernel, for one thread."""
         if self.is_length:
             return EdgeCost()
-        return EdgeCost(self.field.room(self.vehicle), self.preferred_clearance, self.weight)
+        cells = self.field.cost_cells
+        return EdgeCost(self.field.room(self.vehicle), self.preferred_clearance, self.weight,
+                        cells.kernel() if cells else None, self.cell_weight if cells else 0.0)
 
     def slowness(self, is_bound: bool) -> tuple[np.ndarray, np.ndarray] | None:
         """Return what a metre costs in the free squares and at their nodes; None where it is 1.
@@ -52,7 +57,8 @@ class Objective:
         """
         if self.is_length or self.vehicle.required_clearance < 0:  # which tells nothing of the room from the reference point's
             return None
-        return self.field.slowness(self.vehicle.inscribed_radius, self.preferred_clearance, self.weight, is_bound)
+        return self.field.slowness(self.vehicle.inscribed_radius, self.preferred_clearance, self.weight, self.cell_weight,
+                                   is_bound)
 
     def edge_costs(self, starts: np.ndarray, radius: float, words: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return the (n,) costs of edges with (n, 3) lengths of arcs from (n, 3) poses [m]."""
@@ -70,6 +76,11 @@ class Objective:
     def path_cost(self, path: Path) -> float:
         """Return the cost of a path [m], added up in the order of the tree's costs."""
         return float(np.cumsum([0.0, *self.curve_costs(path)])[-1])
+
+
+def minimises_length(problem: Problem, settings: Settings) -> bool:
+    """Return True if what is minimised is the length; the problem's map is as the settings have it."""
+    return settings.preferred_clearance_of(problem.vehicle) == 0 and (problem.map.costs is None or settings.weight_of_cells == 0)
 
 
 def lengths_of(lengths: np.ndarray) -> np.ndarray:
