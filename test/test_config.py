@@ -1,5 +1,6 @@
-"""The files in config/: RViz shows and sends what the node publishes and hears."""
+"""The files in config/: RViz and Foxglove show and send what the node publishes and hears."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -49,3 +50,12 @@ def test_every_display_is_switched_as_its_value_says(rviz):
     """RViz keeps the two alike."""
     for display in rviz["Visualization Manager"]["Displays"]:
         assert display["Enabled"] == display["Value"], display["Name"]
+
+
+def test_foxglove_shows_and_sends_the_same():
+    layout = json.loads((CONFIG / "foxglove.json").read_text("utf-8"))
+    scene, status = layout["configById"]["3D!planner"], layout["configById"]["RawMessages!status"]
+    assert set(scene["topics"]) == set(OUTPUTS)
+    assert {scene["publish"]["poseTopic"], scene["publish"]["poseEstimateTopic"]} == set(INPUTS)
+    assert status["topicPath"] == "/planner/status"
+    assert {layout["layout"]["first"], layout["layout"]["second"]} == set(layout["configById"])

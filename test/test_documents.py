@@ -1,4 +1,4 @@
-"""README.md and the pages in docs/: their commands and programs run as printed, and what they point at is there.
+"""README.md and the manual in docs/: their commands and programs run as printed, and what they point at is there.
 
 A block in the language `sh` is run as one script, in a copy of the source tree that the blocks of its page share, and one in
 `python` as one program. The line before a block may say `<!-- not run: REASON -->`.
@@ -24,7 +24,7 @@ from support.domains import claim_domain
 import dubins_rrt_ros
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ["README.md", *sorted(f"docs/{page.name}" for page in ROOT.glob("docs/*.md"))]
+PAGES = ["README.md", *sorted(page.relative_to(ROOT).as_posix() for page in ROOT.glob("docs/**/*.md"))]
 #: Marks of blocks that others run: .ci/run, and test/node/test_reference.py.
 RUN_ELSEWHERE = ("quick start", "example client")
 #: How a block is run, by its language.
@@ -170,6 +170,14 @@ def test_every_relative_link_leads_somewhere(page):
     targets = {next(filter(None, groups)) for groups in LINK.findall(shown)}
     relative = {target for target in targets if not re.match("[a-z]+:", target)}
     assert sorted(target for target in relative if not is_there(page, target)) == []
+
+
+def test_every_page_has_its_place_in_the_manual():
+    """Its links and its code are tested here, and that it is well formed by Sphinx, in .ci/run."""
+    trees = re.findall(r"```{toctree}\n(.*?)```", text_of("docs/index.md"), re.DOTALL)
+    placed = [f"docs/{entry}.md" for tree in trees for entry in re.findall(r"^[\w/]+$", tree, re.MULTILINE)]
+    assert len(trees) == 4  # tutorial, how-to guides, reference, background
+    assert sorted([*placed, "docs/index.md", "README.md"]) == sorted(PAGES)
 
 
 @cache

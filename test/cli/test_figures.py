@@ -19,7 +19,7 @@ from dubins_rrt_ros.planning.curves.dubins import shortest
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "docs" / "figures"
 #: Each page with a picture of this folder, and the picture.
-SHOWN = sorted({(page.name, (page.parent / link).resolve()) for page in (ROOT / "README.md", *FIGURES.parent.glob("*.md"))
+SHOWN = sorted({(page.name, (page.parent / link).resolve()) for page in (ROOT / "README.md", *FIGURES.parent.glob("**/*.md"))
                 for link in re.findall(r"!\[[^]]*\]\(([^)]*figures/[^)]+)\)", page.read_text("utf-8"))})
 
 

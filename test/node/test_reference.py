@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dubins_rrt_ros.node.conversions import status_message
 from dubins_rrt_ros.planning import Status
 
 REFERENCE = (Path(__file__).resolve().parents[2] / "docs/reference.md").read_text("utf-8")
@@ -48,6 +49,12 @@ def test_the_table_of_error_codes_is_that_of_the_statuses():
     rows = [(codes.split(", "), names.split(", ")) for codes, names, *_ in table("code", "name")]
     told = {int(code): name for codes, names in rows for code, name in zip(codes, names, strict=True)}
     assert told == {int(status): status.name for status in Status}
+
+
+def test_the_table_of_status_keys_is_what_a_status_has():
+    told = [key.strip("`") for keys, *_ in table("key", "value") for key in keys.split(", ")]
+    has = [value.key for value in status_message("/planner", Status.NO_MAP, "").values]
+    assert sorted(told) == sorted(has)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Figures of docs/dubins_curves.md and docs/collisions.md, drawn from what the planner's own code computes."""
+"""Figures of docs/dubins_curves.md, collisions.md and howto/reference_point.md, drawn from what the planner itself computes."""
 
 import math
 from collections.abc import Callable
@@ -46,6 +46,8 @@ ROOM = PolygonMap(shapely.difference(shapely.box(0, 0, 12, 6), shapely.union_all
 CURVE, DISC = shortest((1.0, 2.4, -1.1), (11.1, 3.4, -1.2), 1.5), Vehicle(turning_radius=1.5, robot_radius=0.4)
 #: Footprint of a car whose rear axle is 0.9 m from its rear; margin, turning radius and length of a straight arc [m].
 CAR, WIDER, TIGHT, STRAIGHT = ((3.6, 0.9), (-0.9, 0.9), (-0.9, -0.9), (3.6, -0.9)), 0.3, 5.0, 1.5
+#: Wheelbase, half the track, and length and width of a wheel of that car [m].
+WHEELBASE, HALF_TRACK, WHEEL = 2.7, 0.62, (0.6, 0.2)
 
 
 class Query(NamedTuple):
@@ -220,4 +222,40 @@ def _draw_shape(axes: Axes, corners: ArrayLike, colour: str) -> None:
     axes.add_patch(Polygon(corners, facecolor=to_rgba(colour, 0.2), edgecolor=colour, linewidth=1.8, zorder=3))
 
 
-FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (six_words, collision_walk, footprint_cover)}
+def reference_point() -> Figure:
+    """Draw a car that turns left as tightly as it can, with its reference point and what is measured from there."""
+    figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
+    axes = figure.subplots()
+    axes.set(aspect="equal", xlim=(-3.6, 6.0), ylim=(-1.5, 5.3))
+    axes.axis("off")
+    _draw_shape(axes, CAR, PATH)
+    for x in (0.0, WHEELBASE):
+        for y in (-HALF_TRACK, HALF_TRACK):
+            # Each front wheel stands at right angles to the line to the centre of the turn.
+            _draw_wheel(axes, x, y, math.atan2(x, TIGHT - y))
+    for x, y in ((0.0, 0.0), (WHEELBASE, 0.0)):
+        axes.plot((x, 0), (y, TIGHT), color=UNKNOWN, linewidth=1.2, linestyle="--")
+    axes.plot((0, WHEELBASE), (0, 0), color=PATH, linewidth=1.2)
+    circle = np.linspace(-0.45, 0.75, 60)
+    axes.plot(TIGHT * np.sin(circle), TIGHT * (1 - np.cos(circle)), color=GOAL, linewidth=2.2, zorder=4)
+    _draw_arrow(axes, (0, 0), (1.7, 0), START)
+    axes.plot(0, 0, "o", color=START, markersize=8, zorder=6)
+    axes.plot(0, TIGHT, "+", color=OBSTACLE, markersize=12, markeredgewidth=2)
+    for place, text, side in (
+            ((-0.15, TIGHT / 2), "R", "right"), ((0.18, TIGHT - 1.1), "φ", "left"), ((WHEELBASE - 0.55, -0.25), "L", "center"),
+            ((0.3, TIGHT - 0.05), "centre of the turn: R = L / tan φ", "left"), ((3.5, 1.75), "path", "left"),
+            ((3.7, 0.95), "corner (3.6, 0.9)", "left"), ((-1.0, -0.95), "corner (-0.9, -0.9)", "right"),
+            ((0.0, -1.25), "reference point (0, 0): the middle of the rear axle", "left")):
+        axes.text(*place, text, fontsize=LABEL, ha=side, va="center", zorder=6)
+    return figure
+
+
+def _draw_wheel(axes: Axes, x: float, y: float, angle: float) -> None:
+    length, width = WHEEL
+    corners = np.array([(length, width), (-length, width), (-length, -width), (length, -width)]) / 2
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    axes.add_patch(Polygon(corners @ turn + (x, y), color=OBSTACLE, zorder=4))
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (
+    six_words, collision_walk, footprint_cover, reference_point)}
