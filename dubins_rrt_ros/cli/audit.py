@@ -10,8 +10,8 @@ import numpy as np
 
 from dubins_rrt_ros import __version__
 from dubins_rrt_ros.planning import Audit, InvalidPose, Map, Path, Problem, Settings, Vehicle, audit_path, values
-from dubins_rrt_ros.planning.audit import cost_of
-from dubins_rrt_ros.planning.audit.document import document_findings, pose_findings, unjudged_fields
+from dubins_rrt_ros.planning.audit import cost_of, roomy_share_of
+from dubins_rrt_ros.planning.audit.document import CostFigures, document_findings, pose_findings, unjudged_fields
 from dubins_rrt_ros.planning.audit.poses import audit_poses, driven_length
 from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
 from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
@@ -130,17 +130,18 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
     # With other things than it was planned with its clearance is another.
     others = ["min_clearance"] if given or of_request or arguments.any_map else []
     others += ["map_id"] if arguments.any_map else []
-    others += ["cost", "cost_lower_bound", "cost_gap"] if others else []
+    others += ["cost", "cost_lower_bound", "cost_gap", "roomy_share"] if others else []
     findings = document_findings({name: value for name, value in document.items() if name not in others}, path, found,
-                                 world_map.id, None if others or not found.ok else _cost(path, problem, settings))
+                                 world_map.id, None if others or not found.ok else _costs(path, problem, settings))
     along = () if math.isinf(found.max_curvature) else pose_findings(_poses(document), path, spacing)
     return Verdict(problem, path.length, replace(found, findings=(*found.findings, *along, *findings)),
                    tuple(unjudged_fields(document, others)))
 
 
-def _cost(path: Path, problem: Problem, settings: Settings) -> float:
-    return cost_of(path, problem, settings.preferred_clearance_of(problem.vehicle), settings.clearance_weight,
-                   settings.weight_of_cells)
+def _costs(path: Path, problem: Problem, settings: Settings) -> CostFigures:
+    preferred = settings.preferred_clearance_of(problem.vehicle)
+    return CostFigures(cost_of(path, problem, preferred, settings.clearance_weight, settings.weight_of_cells),
+                       roomy_share_of(path, problem, preferred) if preferred > 0 and path.length > 0 else None)
 
 
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:

@@ -287,14 +287,14 @@ def status_message(node: str, status: Status, message: str, *, request: str = ""
 def _figures(plan: Plan | None) -> dict[str, object]:
     # The length goes by its name here and by that in files and in the library, too.
     names = ("found_by", "planner", "samples", "tree_nodes", "path_length", "length", "lower_bound", "gap", "cost",
-             "cost_lower_bound", "cost_gap", "time_to_first", "time_to_found", "planning_time", "min_clearance",
+             "cost_lower_bound", "cost_gap", "roomy_share", "time_to_first", "time_to_found", "planning_time", "min_clearance",
              "max_curvature", "audit", "seed")
     if plan is None:
         return dict.fromkeys(names)
     return dict(zip(names, (
         plan.found_by, plan.settings.planner, plan.samples, len(plan.tree.poses), plan.length, plan.length,
-        plan.lower_bound, plan.gap, plan.cost, plan.cost_lower_bound, plan.cost_gap, plan.time_to_first, plan.time_to_found,
-        plan.planning_time,
+        plan.lower_bound, plan.gap, plan.cost, plan.cost_lower_bound, plan.cost_gap, plan.roomy_share,
+        plan.time_to_first, plan.time_to_found, plan.planning_time,
         plan.min_clearance, plan.max_curvature, plan.audit, plan.settings.seed,
     ), strict=True))
 

@@ -84,6 +84,7 @@ class WholePlans:
         self._path, self._message = departure.path, departure.message
         self.rest = replace(problem, start=self._path.end, start_slack=0.0, world=world)
         objective = Objective.of(problem, settings, world.field)
+        self._objective = objective
         self._cost, self._curve_costs = objective.path_cost(self._path), objective.curve_costs(self._path)
         self._audited: tuple[Path, Audit] | None = None
         self._before = deadline.elapsed
@@ -113,7 +114,7 @@ class WholePlans:
         bound = min(bound, path.length)
         return replace(answer, message=message, path=path, audit=audit, start_too_near=True, lower_bound=bound,
                        cost=float(tree.costs[node + len(self._path.curves)]), cost_lower_bound=bound,
-                       planning_time=self._deadline.elapsed)
+                       roomy_share=self._objective.roomy_share(path), planning_time=self._deadline.elapsed)
 
     def progress(self, report: Progress) -> Progress:
         """Return the report on the problem, given one on its rest."""
@@ -134,8 +135,8 @@ class WholePlans:
         return self._audited[1]
 
     def _without_path(self, answer: Plan, status: Status, message: str, **more: Any) -> Plan:
-        return replace(answer, **{"audit": None} | more, status=status, message=message, path=None, cost=None, found_by="",
-                       waypoint_indices=(), planning_time=self._deadline.elapsed)
+        return replace(answer, **{"audit": None} | more, status=status, message=message, path=None, cost=None,
+                       roomy_share=None, found_by="", waypoint_indices=(), planning_time=self._deadline.elapsed)
 
 
 def find_departure(problem: Problem, world: World, occupied: str, check_time: Callable[[], None]) -> Departure:

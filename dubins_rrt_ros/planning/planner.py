@@ -264,7 +264,8 @@ class _Call:
             simple = search.without_short_arcs(simple)
         self._found_cost = search.cost
         return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
-                        search.objective.path_cost(simple), path, simplify or search.objective.is_length)
+                        search.objective.path_cost(simple), path, simplify or search.objective.is_length,
+                        search.objective.roomy_share(simple))
 
     def _simplified(self, path: Path, search: Search) -> Path:
         """Return a simpler form of a path, for which there is time kept once it is known how long that takes."""
@@ -399,7 +400,7 @@ class _Call:
                                   running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
                           audit=best.audit, found_by=best.found_by, lower_bound=bound, cost=best.cost,
-                          cost_lower_bound=cost_bound, planning_time=elapsed)
+                          roomy_share=best.roomy_share, cost_lower_bound=cost_bound, planning_time=elapsed)
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
         figures = {"lower_bound": self._bound, "cost_lower_bound": self._cost_bound, "planning_time": self._elapsed} | more

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .audit.verdict import Audit
+from .collision.clearance import ClearanceField
 from .curves.angles import heading_error, position_error
 from .curves.dubins import ROUNDING
 from .curves.path import JOINT, Path
@@ -18,6 +19,7 @@ from .problem import Pose, Problem, Waypoint
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
+from .world import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +67,8 @@ class Plan(Plottable):
         lower_bound: no path of the problem is shorter [m].
         cost: what was minimised, of the path [m]: its length where preferred_clearance is 0; None without a path.
         cost_lower_bound: no path of the problem costs less [m].
+        roomy_share: share of the path's length where the room is at least 0.8 times the preferred clearance; None without a
+            path, and where no clearance is preferred or nothing driven.
         found_by: what found the path, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one, and
             where nothing had to be searched.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
@@ -89,6 +93,7 @@ class Plan(Plottable):
     lower_bound: float = 0.0
     cost: float | None = None
     cost_lower_bound: float = 0.0
+    roomy_share: float | None = None
     found_by: str = ""
     audit: Audit | None = None
     start_too_near: bool = False
@@ -140,6 +145,21 @@ class Plan(Plottable):
     def cost_gap(self) -> float | None:
         """The ratio cost / cost_lower_bound - 1, as `gap` is that of the length."""
         return None if self.cost is None else gap_above(self.cost_lower_bound, self.cost)
+
+    def clearances(self) -> np.ndarray:
+        """Return the (n,) clearances at `poses` [m]: of a disc's middle, or of the footprint."""
+        problem = self.problem
+        field = (problem.world.field if isinstance(problem.world, World)
+                 else ClearanceField(problem.map, problem.allow_unknown))
+        return field.clearances(self.poses(), problem.vehicle)
+
+    def rooms(self) -> np.ndarray | None:
+        """Return the (n,) distances of the vehicle's outline from obstacles at `poses`, in preferred clearances, or None."""
+        preferred = self.settings.preferred_clearance_of(self.problem.vehicle)
+        if preferred == 0:
+            return None
+        inset = 0.0 if self.problem.vehicle.footprint else self.problem.vehicle.robot_radius
+        return (self.clearances() - inset) / preferred
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw map, tree, path and vehicle, or why there is no path, on axes or in a new pyplot figure, and return the axes.

@@ -13,6 +13,8 @@ MAX_PLANNING_TIME = 3600.0
 MIN_PLANNING_TIME = 0.001
 #: Minimum path_spacing, where it is not 0 [m].
 MIN_SPACING = 0.001
+#: Share of the preferred clearance from which on a place counts as roomy: at corners the best path is a little inside it.
+ROOMY = 0.8
 #: The options of the paper's plain algorithms.
 PAPER = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
 

@@ -308,7 +308,8 @@ class _Call:
                    f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s.")
         bound = min(self._lower_bound(), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
-                            cost=float(tree.costs[-1]), cost_lower_bound=bound, found_by=self._found_by,
+                            cost=float(tree.costs[-1]), cost_lower_bound=bound,
+                            roomy_share=self._objective.roomy_share(path), found_by=self._found_by,
                             cancelled=self._clock.cancelled)
         return replace(answer, waypoint_indices=tuple(_indices(stops, paths, answer.poses())))
 

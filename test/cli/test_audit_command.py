@@ -122,7 +122,7 @@ def test_every_joint_of_a_plan_is_among_its_poses(document, capsys):
 @pytest.mark.parametrize(("field", "value"), [
     ("length", 12.0), ("path_length", 12.0),
     ("length", "long"), ("length", None), ("lower_bound", 1e3), ("lower_bound", -1.0), ("lower_bound", 1.0),
-    ("gap", 0.0), ("gap", None), ("cost", None), ("cost_lower_bound", 99.0), ("cost_gap", 0.0),
+    ("gap", 0.0), ("gap", None), ("cost", None), ("cost_lower_bound", 99.0), ("cost_gap", 0.0), ("roomy_share", 0.5),
     ("min_clearance", 1.5), ("max_curvature", 0.5), ("error_code", 208), ("error_name", "TIMEOUT"),
     ("audit", "fine"), ("map_id", "0123456789ab"), ("planner", "rrt"), ("seed", 99)])
 def test_a_figure_that_is_not_the_path_s_is_found(document, field, value, capsys):
@@ -142,6 +142,8 @@ def test_the_cost_of_clearance_is_measured_anew(capsys):
     for share in (0.99, 1.01):
         status, out, _ = run(write(found | {"cost": share * found["cost"]}), "hall.wkt", capsys=capsys)
         assert status == 1 and f"cost is {share * found['cost']:.6g}"[:10] in out
+    assert 0 < found["roomy_share"] < 1
+    assert "roomy_share is 1.0" in run(write(found | {"roomy_share": 1.0}), "hall.wkt", capsys=capsys)[1]
 
 
 def test_what_is_not_judged_is_named(document, capsys):

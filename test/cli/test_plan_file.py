@@ -14,7 +14,7 @@ from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_req
 from dubins_rrt_ros.planning.text import LONGEST
 
 FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "cost",
-           "cost_lower_bound", "cost_gap", "min_clearance", "max_curvature")
+           "cost_lower_bound", "cost_gap", "roomy_share", "min_clearance", "max_curvature")
 FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES,
           "path_length", "audit",
           "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}

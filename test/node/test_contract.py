@@ -42,7 +42,8 @@ SERVICES = [
 ]
 KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
         "path_length", "length",
-        "lower_bound", "gap", "cost", "cost_lower_bound", "cost_gap", "time_to_first", "time_to_found", "planning_time",
+        "lower_bound", "gap", "cost", "cost_lower_bound", "cost_gap", "roomy_share",
+        "time_to_first", "time_to_found", "planning_time",
         "min_clearance", "max_curvature", "audit",
         "seed", "map_id", "stamp"]
 

@@ -271,7 +271,8 @@ def test_a_long_and_thin_polygon_map_is_published_with_no_more_cells(size):
 
 KEYS = ["plan_id", "revision", "error_code", "error_name", "request", "found_by", "planner", "samples", "tree_nodes",
         "path_length", "length",
-        "lower_bound", "gap", "cost", "cost_lower_bound", "cost_gap", "time_to_first", "time_to_found", "planning_time",
+        "lower_bound", "gap", "cost", "cost_lower_bound", "cost_gap", "roomy_share",
+        "time_to_first", "time_to_found", "planning_time",
         "min_clearance", "max_curvature", "audit",
         "seed", "map_id", "stamp"]
 
@@ -298,6 +299,7 @@ def test_the_status_of_a_path_has_all_its_figures(over_the_wire, plans):
                         "planning_time": plan.planning_time,
                         "min_clearance": plan.min_clearance, "max_curvature": plan.max_curvature}.items():
         assert float(told[key]) == figure, key
+    assert told["roomy_share"] == "", "no clearance is preferred"
 
 
 def test_the_status_of_a_failure_has_all_keys_and_is_an_error(over_the_wire, plans):

@@ -10,7 +10,7 @@ from support.cases import boxes_grid, needs_compiled, random_pose, scaled
 
 from dubins_rrt_ros.planning import ClearanceField, GridMap, PolygonMap, Problem, Settings, Vehicle, load_map, plan
 from dubins_rrt_ros.planning._kernels.dubins import poses_along
-from dubins_rrt_ros.planning.audit import cost_of
+from dubins_rrt_ros.planning.audit import cost_of, roomy_share_of
 from dubins_rrt_ros.planning.curves.dubins import shortest
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.planning.search.cost import Objective
@@ -188,6 +188,8 @@ def test_a_path_costs_less_than_the_shortest_one_and_the_audit_measures_the_same
     assert result.cost == pytest.approx(cost_of(result.path, problem, PREFERRED, WEIGHT), rel=1e-3)
     assert result.lower_bound <= result.cost_lower_bound <= result.cost and result.length <= result.cost
     assert result.lower_bound <= shortest_path.length
+    assert shortest_path.roomy_share is None and result.roomy_share == pytest.approx(
+        roomy_share_of(result.path, problem, PREFERRED), abs=0.02)
     again = plan(problem, settings)
     assert again.path == result.path and again.cost == result.cost
 

@@ -68,6 +68,17 @@ def test_a_plan_without_a_path_shows_the_cause():
     assert result.status.name in axes.get_title() and "why there is no path" in legend(axes) and "path" not in legend(axes)
 
 
+def test_a_path_with_a_preferred_clearance_is_coloured_by_its_room():
+    result = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1, preferred_clearance=5.0))
+    axes = result.plot()
+    assert {"path without room", "with the preferred clearance"} <= set(legend(axes))
+    by_room = next(lines for lines in axes.collections if lines.get_array() is not None)
+    rooms = result.rooms()
+    np.testing.assert_allclose(by_room.get_array(), (rooms[:-1] + rooms[1:]) / 2)
+    assert rooms == pytest.approx((result.clearances() - 0.2) / 5.0)
+    assert plan(problem_here(), Settings(samples=20, planning_time=60.0)).rooms() is None
+
+
 def test_a_map_and_a_tree_share_axes():
     result = plan(problem_here(), Settings.paper(samples=50, planning_time=60.0, seed=1))
     axes = result.problem.map.plot()

@@ -9,7 +9,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from dubins_rrt_ros.planning import ClearanceField, Plan
+from dubins_rrt_ros.planning import Plan
 from dubins_rrt_ros.planning.pictures import ANIMATIONS, VIDEO
 from dubins_rrt_ros.planning.plan_file import to_document
 
@@ -90,15 +90,9 @@ def write_csv(file: str, plan: Plan) -> None:
     left [1/m].
     """
     poses = plan.poses()
-    rows = np.column_stack([poses, _clearances(plan, poses), _curvatures(poses)]).tolist() if len(poses) else []
+    rows = np.column_stack([poses, plan.clearances(), _curvatures(poses)]).tolist() if len(poses) else []
     with Path(file).open("w", newline="", encoding="utf-8") as out:
         csv.writer(out, lineterminator="\n").writerows([CSV_COLUMNS, *rows])
-
-
-def _clearances(plan: Plan, poses: np.ndarray) -> np.ndarray:
-    """Return the (n,) clearances at the poses of a plan [m]."""
-    problem = plan.problem
-    return ClearanceField(problem.map, problem.allow_unknown).clearances(poses, problem.vehicle)
 
 
 def _curvatures(poses: np.ndarray) -> np.ndarray:

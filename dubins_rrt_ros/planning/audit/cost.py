@@ -1,13 +1,14 @@
 """The cost of a path by the audit's own measure: points close together, distances to the obstacles' true shapes, and cells."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..maps.model import GridMap
 from ..problem import Problem
+from ..settings import ROOMY
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 from .sweep import Arcs, DiscSweep, PolygonSweep, any_time
 from .verdict import driven_arcs
@@ -21,6 +22,8 @@ SPACING, MOST_POINTS = 1 / 64, 1_000_000
 CELL_PIECE, CELL_PARTS = 1 / 8, 64
 #: Relative error of a cost that is claimed and right: that of the planner's integrals, and that of these.
 COST_ERROR = 1.5e-3
+#: Error of a share of the length with room that is claimed and right, where the room is about what counts as such.
+SHARE_ERROR = 0.02
 #: Number of points that are measured at once.
 AT_ONCE = 2048
 
@@ -50,19 +53,31 @@ def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: 
     return cost
 
 
+def roomy_share_of(path: "Path", problem: Problem, preferred_clearance: float, obstacles: Obstacles | None = None,
+                   check_time: Callable[[], None] = any_time) -> float:
+    """Return the share of a path's length with room of at least 0.8 preferred clearances; the arguments are as for `cost_of`."""
+    arcs = driven_arcs(path.curves, path.start)[2]
+    return sum(float(size[room >= ROOMY * preferred_clearance].sum())
+               for size, room in _rooms(arcs, problem, preferred_clearance, obstacles, check_time)) / path.length
+
+
 def _crowding(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None,
               check_time: Callable[[], None]) -> float:
     """Return the integral of max(0, 1 - room / preferred_clearance)^2 [m]."""
+    return sum(float((size * np.maximum(0, 1 - room / preferred_clearance)**2).sum())
+               for size, room in _rooms(arcs, problem, preferred_clearance, obstacles, check_time))
+
+
+def _rooms(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None, check_time: Callable[[], None]
+           ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the sizes of pieces of the arcs [m], and the room in their middles, as far as that is below the preferred one [m]."""
     index, begin, size = arcs.pieces(max(SPACING * preferred_clearance, float(arcs.length.sum()) / MOST_POINTS))
     x, y, theta = arcs.at(index, begin + size / 2)
     vehicle, inset = _vehicle(problem, preferred_clearance, obstacles, arcs, check_time)
-    integral = 0.0
     for first in range(0, len(x), AT_ONCE):
         check_time()
         some = slice(first, first + AT_ONCE)
-        room = vehicle.clearance(x[some], y[some], theta[some]) - inset
-        integral += float((size[some] * np.maximum(0, 1 - room / preferred_clearance)**2).sum())
-    return integral
+        yield size[some], vehicle.clearance(x[some], y[some], theta[some]) - inset
 
 
 def _over_cells(arcs: Arcs, grid: GridMap, check_time: Callable[[], None]) -> float:

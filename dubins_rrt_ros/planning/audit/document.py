@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..option import is_number
 from ..problem import InvalidPose, checked_waypoint
 from ..text import quoted
-from .cost import COST_ERROR
+from .cost import COST_ERROR, SHARE_ERROR
 from .sweep import PRECISION, SHARE, Arcs
 from .verdict import TOLERANCE, Audit, driven_arcs, in_order, passing_findings
 
@@ -28,7 +28,14 @@ _SETTINGS = ("planner", "seed")
 _AHEAD = 8
 
 
-def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, map_id: str, cost: float | None = None
+class CostFigures(NamedTuple):
+    """The cost of a path by the settings of its document [m], and the share of its length with room, or None."""
+
+    cost: float
+    roomy_share: float | None
+
+
+def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, map_id: str, costs: CostFigures | None = None
                       ) -> Iterator[str]:
     """Yield a sentence for each field that does not agree with the path.
 
@@ -37,7 +44,7 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
         path: the path of its curves.
         found: what the audit found of that path, with the vehicle and on the map of the document.
         map_id: the id of the map; "" where another one may be taken.
-        cost: the cost of the path by the document's settings [m]; None where that is not judged.
+        costs: the figures of its cost by the document's settings; None where they are not judged.
     """
     for name, expected in _SAID_OF_A_PATH.items():
         if name in document and document[name] != expected:
@@ -55,11 +62,16 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
     yield from _figure(document, "max_curvature", found.max_curvature, _ROUNDING * found.max_curvature)
     yield from _figure(document, "min_clearance", found.min_clearance, max(PRECISION, SHARE * found.min_clearance))
     yield from _bound_findings(document, length, "lower_bound", "gap", f"the path is {length:.6g} m long", _ROUNDING)
-    if cost is not None:
+    if costs is not None:
+        cost, roomy_share = costs
         tolerance = _ROUNDING if cost == length else COST_ERROR
         yield from _figure(document, "cost", cost, tolerance * cost)
         yield from _bound_findings(document, document.get("cost", cost), "cost_lower_bound", "cost_gap",
                                    f"the cost is {cost:.6g} m", tolerance)
+        if roomy_share is not None:
+            yield from _figure(document, "roomy_share", roomy_share, SHARE_ERROR)
+        elif document.get("roomy_share") is not None:
+            yield f"roomy_share is {quoted(document['roomy_share'])}, and no clearance is preferred"
 
 
 def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()) -> list[str]:
@@ -68,7 +80,7 @@ def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()
     Of the lower bounds it is judged that the path is not below them, but not that no other one is.
     """
     judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "path_length", "max_curvature", "min_clearance", "gap",
-              "cost", "cost_gap", "poses", "waypoints", "waypoint_indices"}
+              "cost", "cost_gap", "roomy_share", "poses", "waypoints", "waypoint_indices"}
     others = [name for name in document if name not in judged or name in passed_over]
     said = {"lower_bound": "lower_bound (that no path is shorter)",
             "cost_lower_bound": "cost_lower_bound (that no path costs less)"}

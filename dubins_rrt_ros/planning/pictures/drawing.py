@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.transforms import Affine2D
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
 TREE, PATH, START, GOAL, FAILURE = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
+#: Colours of a path by its room: none, and as much as preferred.
+TIGHT, ROOMY = PATH, "#56b4e9"
+ROOM_COLOURS = LinearSegmentedColormap.from_list("room", [TIGHT, ROOMY])
 DPI = 160
 #: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
@@ -44,6 +48,7 @@ class Drawing(NamedTuple):
         title: the most important figures, in one sentence.
         subtitle: the other figures.
         location: (x, y) of what keeps a path from being there [m], or None.
+        rooms: (n,) room at the poses of the path, in preferred clearances, which colours it; None for one colour.
     """
 
     map: Map
@@ -55,6 +60,7 @@ class Drawing(NamedTuple):
     title: str
     subtitle: str
     location: tuple[float, float] | None = None
+    rooms: np.ndarray | None = None
 
 
 def draw_plan(file: str, plan: "Plan") -> None:
@@ -67,7 +73,8 @@ def of_plan(plan: "Plan") -> Drawing:
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
     title, subtitle = _captions(plan)
     return Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
-                   plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location)
+                   plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location,
+                   plan.rooms())
 
 
 def _captions(plan: "Plan") -> tuple[str, str]:
@@ -108,7 +115,7 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     """Draw all but the titles on axes that `frame` has fitted to the map."""
     draw_map(axes, drawing.map)
     draw_tree(axes, drawing.tree)
-    draw_path(axes, drawing.vehicle, drawing.path)
+    draw_path(axes, drawing.vehicle, drawing.path, drawing.rooms)
     draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
     if drawing.location is not None:
         axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
@@ -193,12 +200,20 @@ def draw_tree(axes: Axes, segments: np.ndarray) -> LineCollection:
     return lines
 
 
-def draw_path(axes: Axes, vehicle: Vehicle, path: np.ndarray) -> None:
-    """Draw (n, 3) poses close together, if any, and the area that the vehicle sweeps along them."""
+def draw_path(axes: Axes, vehicle: Vehicle, path: np.ndarray, rooms: np.ndarray | None = None) -> None:
+    """Draw (n, 3) poses close together, if any, and the area that the vehicle sweeps along them.
+
+    With (n,) `rooms`, in preferred clearances, the path goes from one colour, where there is none, to another, where there is as
+    much as preferred.
+    """
     if len(path) == 0:
         return
     axes.add_patch(PathPatch(swept(vehicle, path), facecolor=PATH, alpha=SWEPT, edgecolor="none", zorder=3))
     axes.plot(path[:, 0], path[:, 1], color=PATH, linewidth=2.4, solid_capstyle="round", solid_joinstyle="round", zorder=4)
+    if rooms is not None and len(path) > 1:
+        pieces = np.stack([path[:-1, :2], path[1:, :2]], axis=1)
+        axes.add_collection(LineCollection(list(pieces), array=(rooms[:-1] + rooms[1:]) / 2, cmap=ROOM_COLOURS, clim=(0.0, 1.0),
+                                           linewidths=2.4, capstyle="round", zorder=4))
 
 
 def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:

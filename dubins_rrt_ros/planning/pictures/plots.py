@@ -14,7 +14,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from ..maps.model import GridMap, Map
 from . import drawing
-from .drawing import FAILURE, FREE, OBSTACLE, PATH, SWEPT, TREE, UNKNOWN
+from .drawing import FAILURE, FREE, OBSTACLE, PATH, ROOMY, SWEPT, TIGHT, TREE, UNKNOWN
 
 if TYPE_CHECKING:
     from ..result import Plan
@@ -59,7 +59,7 @@ def plot_plan(plan: "Plan", ax: Axes | None = None) -> Axes:
     axes.set_title(contents.title, fontsize=11)
     handles = [*_map_handles(problem.map), *(_tree_handles(plan.tree) if len(plan.tree) > 1 else ())]
     if plan.path is not None:
-        handles += [Line2D([], [], color=PATH, linewidth=2.4, label="path"),
+        handles += [*_path_handles(contents.rooms is not None),
                     Patch(color=PATH, alpha=SWEPT, label="swept by the vehicle")]
     if plan.location is not None:
         handles.append(Line2D([], [], color=FAILURE, marker="x", linestyle="", markeredgewidth=3, label="why there is no path"))
@@ -92,6 +92,11 @@ def _map_handles(world_map: Map) -> list[Artist]:
 
 def _tree_handles(tree: "Tree") -> list[Artist]:
     return [Line2D([], [], color=TREE, label=f"tree of {len(tree)} nodes")]
+
+
+def _path_handles(is_by_room: bool) -> list[Artist]:
+    kinds = [(TIGHT, "path without room"), (ROOMY, "with the preferred clearance")] if is_by_room else [(PATH, "path")]
+    return [Line2D([], [], color=colour, linewidth=2.4, label=label) for colour, label in kinds]
 
 
 def _add_legend(axes: Axes, handles: list[Artist]) -> None:

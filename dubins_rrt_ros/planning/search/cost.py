@@ -1,5 +1,6 @@
 """What a search minimises, for one vehicle on one map; `_kernels/edge_cost.py` states it for the kernels."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,11 @@ from .._kernels.edge_cost import EdgeCost
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
 from ..problem import Problem
-from ..settings import Settings
+from ..settings import ROOMY, Settings
 from ..vehicle import Vehicle
+
+#: Distance between the points whose room is measured, in preferred clearances, and their maximum number.
+SPACING, MOST_POINTS = 1 / 8, 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +80,15 @@ class Objective:
     def path_cost(self, path: Path) -> float:
         """Return the cost of a path [m], added up in the order of the tree's costs."""
         return float(np.cumsum([0.0, *self.curve_costs(path)])[-1])
+
+    def roomy_share(self, path: Path) -> float | None:
+        """Return the share of a path's length with room of 0.8 preferred clearances; None where there is none of either."""
+        if self.preferred_clearance == 0 or self.weight == 0 or path.length == 0:
+            return None
+        points = max(1, min(math.ceil(path.length / (SPACING * self.preferred_clearance)), MOST_POINTS))
+        poses, rooms = path.at((np.arange(points) + 0.5) / points), np.empty(points)
+        self.field.room(self.vehicle).rooms(np.require(poses, float, ["C", "W"]), self.preferred_clearance, rooms)
+        return float((rooms >= ROOMY * self.preferred_clearance).mean())
 
 
 def minimises_length(problem: Problem, settings: Settings) -> bool:
