@@ -1,1 +1,1 @@
-"""The planner measured and judged: what a robot need not install."""
+"""The planner measured and judged, by the library and the commands: what a robot need not install. Nothing imports it."""

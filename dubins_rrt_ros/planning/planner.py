@@ -4,10 +4,7 @@ import math
 import secrets
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
-
-import numpy as np
 
 from .answer import LEAST_IMPROVEMENT, AuditedPath, not_audited_message, success_message
 from .audit.obstacles import Obstacles
@@ -18,6 +15,7 @@ from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import WholePlans, find_departure
 from .diagnosis import explain
+from .memory import keep_freed_memory
 from .problem import Problem
 from .proof.background_proof import BackgroundProof
 from .result import Plan, Progress, Status, gap_above, reaches_goal
@@ -43,19 +41,6 @@ AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
 REASONS_SHARE, MOST_FOR_REASONS = 0.1, 0.1
 #: Number of steps of a search without a path after which a proof is sought that there is none.
 STEPS_TO_PROOF = 4
-#: A block of memory that is larger than any array of most requests [bytes].
-LARGE_BLOCK = 1 << 24
-
-
-@cache
-def _keep_freed_memory() -> None:
-    """Have glibc keep what a request frees for the next one, up to 32 MB.
-
-    By itself it gives much of it back, and fetching that again, page by page, takes up to a quarter of the time to a first path.
-    It keeps twice the largest block that it saw freed; this one costs nothing, as it is not touched. Other C libraries, and
-    limits that were set with mallopt(), are left as they are.
-    """
-    np.empty(LARGE_BLOCK, np.uint8)
 
 
 def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable[[], bool] | None = None,
@@ -164,7 +149,7 @@ class _Call:
 
     def _prepared_world(self) -> World:
         """Return the problem's world, or prepare one; the request's own time begins when it is ready."""
-        _keep_freed_memory()
+        keep_freed_memory()
         self._problem = problem_with_costs(self._problem, self._settings)
         world = world_of(self._problem).with_test_of(self._problem)
         if own_test := world.field.own_test:

@@ -1,1 +1,1 @@
-"""`dubins_rrt demo`: the node asked over real topics. The only command that uses ROS."""
+"""`dubins_rrt demo`: the node asked over real topics, by a client of its own."""

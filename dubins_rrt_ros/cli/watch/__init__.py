@@ -1,1 +1,1 @@
-"""`dubins_rrt watch`: the page of `dubins_rrt play` over a running node."""
+"""`dubins_rrt watch`: the page of `dubins_rrt play` over a running node, which it hears by the topics alone."""

@@ -1,1 +1,1 @@
-"""Exact clearance, footprints, and the motions that are free."""
+"""Exact clearance, footprints, and the motions that are free, on maps and curves, by the kernels; the audit uses none of it."""

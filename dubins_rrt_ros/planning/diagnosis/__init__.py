@@ -1,1 +1,1 @@
-"""The reasons why there is no path, in sentences with figures."""
+"""The reasons why there is no path, in sentences with figures, from the map, the clearance and the tree of the search."""

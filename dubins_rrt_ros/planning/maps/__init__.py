@@ -1,1 +1,1 @@
-"""Free and occupied space, and the readers of map files."""
+"""Free and occupied space, and the readers of map files: the only room that reads any. It knows no vehicle."""
