@@ -115,7 +115,7 @@ def test_cancelled_while_hybrid_a_star_seeks_the_first_path(planner):
 
 
 def test_cancelled_at_once_before_the_clearance_field_is_computed(planner, monkeypatch):
-    monkeypatch.setattr("dubins_rrt_ros.planning.planner.prepare", None)
+    monkeypatch.setattr("dubins_rrt_ros.planning.planner.world_of", None)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner), cancel=lambda: True)
     assert_refused(result, Status.CANCELLED, "Cancelled before a first path: 0 of", "samples drawn, 1 tree node, ")
     assert (result.samples, len(result.tree), result.map_time) == (0, 1, 0.0)
