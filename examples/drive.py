@@ -49,7 +49,7 @@ MOST_TRIES = 50
 REACHED_XY, REACHED_YAW, PATIENCE = 0.25, 0.5, 180.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {"robot_radius": BODY + MARGIN, "turning_radius": TURNING_RADIUS, "replan_on_map_change": True, "replan_rate": 2.0,
-              "start_slack": MARGIN, "samples": 500, "planning_time": 1.0, "publish": "final"}
+              "start_slack": MARGIN, "samples": 500, "planning_time": 1.0}
 
 
 @dataclass

@@ -28,6 +28,11 @@ class Frames:
         self._doubts: set[tuple[str, str]] = set()  # that were logged: the pose's name and the kind
         self._transforms = transforms(node)
 
+    def close(self) -> None:
+        """Hear no more transforms."""
+        if self._transforms is not None:
+            self._transforms.close()
+
     @property
     def follows_vehicle(self) -> bool:
         """True if the vehicle's pose is that of a frame."""

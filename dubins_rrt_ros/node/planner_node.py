@@ -28,7 +28,7 @@ from .readiness import Readiness
 from .start_topics import StartTopics
 
 #: A part of the node that is to be closed.
-Part = TypeVar("Part", ExecutorQueue, Maps, PathCheck, Dispatcher, Nav2)
+Part = TypeVar("Part", ExecutorQueue, Frames, Maps, PathCheck, Dispatcher, Nav2)
 
 #: Time between two log lines on what is missing [s].
 REMINDER_INTERVAL = 5.0
@@ -45,7 +45,7 @@ class PlannerNode(ManagedNode):
     def __init__(self, **kwargs: Any):
         super().__init__("planner", **kwargs)
         self._parameters_in_use = Parameters(self)
-        self._parts: list[ExecutorQueue | Maps | PathCheck | Dispatcher | Nav2] = []
+        self._parts: list[ExecutorQueue | Frames | Maps | PathCheck | Dispatcher | Nav2] = []
         self._warn()
         self.begin(self._parameters_in_use.read().node.managed)
 
@@ -54,7 +54,7 @@ class PlannerNode(ManagedNode):
         parameters, frame = self._parameters_in_use, self._parameters_in_use.read().node.global_frame
         self._queue = self._to_be_closed(ExecutorQueue(self))
         self._outputs = Outputs(self, parameters, frame)
-        self._frames = Frames(self, parameters, frame)
+        self._frames = self._to_be_closed(Frames(self, parameters, frame))
         self._maps = self._to_be_closed(Maps(self, parameters, self._queue, self._on_map_news, self._on_map_prepared))
         self._readiness = Readiness(self, parameters, self._maps, self._outputs, self._frames)
         self._dispatcher = self._to_be_closed(Dispatcher(self, parameters, self._maps, self._queue))

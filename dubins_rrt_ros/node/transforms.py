@@ -1,16 +1,24 @@
-"""Transforms as they come by topic: kept by tf2_ros where it is installed, else by a buffer of our own, if the messages are."""
+"""Transforms as they come by topic: kept by tf2_ros where it is installed, else by a buffer of our own, if the messages are.
 
+They are taken when one is asked for, and once in a while: a robot sends hundreds a second, and each would wake the executor of
+the node, which costs a millisecond.
+"""
+
+import contextlib
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
-from rclpy.clock import JumpHandle, JumpThreshold
+from rclpy.clock import JumpHandle, JumpThreshold, TimeJump
 from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 
 from .conversions import nanoseconds, rigid_from
+from .executor_queue import steady_timer
 from .rigid import Rigid
 from .transform_buffer import TransformBuffer, TransformUnknown
 
@@ -23,38 +31,85 @@ try:
 except ImportError:
     TFMessage = None
 
-#: Quality of service of /tf, and of /tf_static, as tf2 has it.
-TF = QoSProfile(depth=100)
+#: Time between two looks for transforms where none is asked for [s].
+TAKE_INTERVAL = 0.2
+#: Quality of service of /tf, which keeps what comes in that time, and of /tf_static, as tf2 has it.
+TF = QoSProfile(depth=1000)
 TF_STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class Transforms(Protocol):
-    """The transforms that are known; any thread may ask for them."""
+class Buffer(Protocol):
+    """Keeps transforms that its node hears of."""
 
     def lookup(self, target: str, source: str, stamp: int | None) -> tuple[Rigid, int | None]:
         """Return the pose of a frame in another at a time, as `TransformBuffer.lookup` does."""
 
+    def forget_moving(self) -> None:
+        """Forget all but the static ones."""
 
-def transforms(node: Node) -> Transforms | None:
+
+def transforms(node: Node) -> "Transforms | None":
     """Return the transforms that a node hears of; None where neither tf2_ros nor tf2_msgs is installed."""
     if tf2_ros is not None:
-        return Tf2Transforms(node)
-    return None if TFMessage is None else OwnTransforms(node)
+        return Transforms(node, Tf2Buffer)
+    return None if TFMessage is None else Transforms(node, OwnBuffer)
 
 
-def _on_jump_back(node: Node, forget: Callable[[], None]) -> JumpHandle:
-    """Have this called when the node's clock is set back, as a simulation does that begins again, while the handle is kept."""
-    threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
-    return node.get_clock().create_jump_callback(threshold, post_callback=lambda jump: forget())
+class Transforms:
+    """The transforms that are known; any thread may ask for them."""
+
+    def __init__(self, node: Node, make_buffer: Callable[[Node], Buffer]):
+        # A node of its own, which no executor spins but when it is looked at; the rules for topics hold for it too.
+        name = f"{node.get_name()}_transforms"
+        self._listener = Node(name, namespace=node.get_namespace(), context=node.context, enable_rosout=False,
+                              start_parameter_services=False, cli_args=["--ros-args", "-r", f"__node:={name}"])
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(self._listener)
+        self._buffer, self._lock = make_buffer(self._listener), threading.Lock()
+        # When the clock is set back, as by a simulation that begins again.
+        threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
+        self._jumps: JumpHandle = node.get_clock().create_jump_callback(threshold, post_callback=self._forget)
+        steady_timer(node, TAKE_INTERVAL, self._take)
+
+    def lookup(self, target: str, source: str, stamp: int | None) -> tuple[Rigid, int | None]:
+        """Return the pose of a frame in another at a time, as `TransformBuffer.lookup` does."""
+        self._take()
+        return self._buffer.lookup(target, source, stamp)
+
+    def _take(self) -> None:
+        """Hand what has come to the buffer."""
+        with self._lock:
+            while self._takes_some():
+                pass
+
+    def _takes_some(self) -> bool:
+        """Hand one message of each topic to the buffer, and return True if there was any: a round ends as if none had come."""
+        found = False
+        with contextlib.suppress(TimeoutException, ShutdownException, ExternalShutdownException):
+            while True:
+                take, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=0)
+                found = True
+                take()
+                take.result()  # raises what it raised
+        return found
+
+    def _forget(self, jump: TimeJump) -> None:
+        self._take()
+        self._buffer.forget_moving()
+
+    def close(self) -> None:
+        """Hear no more."""
+        with self._lock:
+            self._executor.shutdown()
+            self._listener.destroy_node()
 
 
-class Tf2Transforms:
+class Tf2Buffer:
     """Keeps transforms by tf2_ros."""
 
-    def __init__(self, node: Node):
+    def __init__(self, listener: Node):
         self._buffer = tf2_ros.Buffer()
-        self._listener = tf2_ros.TransformListener(self._buffer, node)
-        self._jumps = _on_jump_back(node, self._buffer.clear)  # which keeps the static ones
+        self._listener = tf2_ros.TransformListener(self._buffer, listener, qos=TF)
 
     def lookup(self, target: str, source: str, stamp: int | None) -> tuple[Rigid, int | None]:
         """Return the pose of a frame in another at a time."""
@@ -68,22 +123,21 @@ class Tf2Transforms:
             raise TransformUnknown("it is no transform")
         return pose, Time.from_msg(found.header.stamp).nanoseconds or None
 
+    def forget_moving(self) -> None:
+        """Forget all but the static ones, which tf2 keeps."""
+        self._buffer.clear()
 
-class OwnTransforms:
+
+class OwnBuffer(TransformBuffer):
     """Keeps transforms by a buffer of our own."""
 
-    def __init__(self, node: Node):
-        self._buffer = TransformBuffer()
-        self._jumps = _on_jump_back(node, self._buffer.forget_moving)
-        node.create_subscription(TFMessage, "/tf", partial(self._take, is_static=False), TF)
-        node.create_subscription(TFMessage, "/tf_static", partial(self._take, is_static=True), TF_STATIC)
+    def __init__(self, listener: Node):
+        super().__init__()
+        listener.create_subscription(TFMessage, "/tf", partial(self._hear, is_static=False), TF)
+        listener.create_subscription(TFMessage, "/tf_static", partial(self._hear, is_static=True), TF_STATIC)
 
-    def _take(self, message: Any, is_static: bool) -> None:
+    def _hear(self, message: Any, is_static: bool) -> None:
         for transform in message.transforms:
             pose, parent, child = rigid_from(transform.transform), transform.header.frame_id, transform.child_frame_id
             if pose is not None and parent and child and parent != child:
-                self._buffer.add(parent, child, nanoseconds(transform.header.stamp), pose, is_static)
-
-    def lookup(self, target: str, source: str, stamp: int | None) -> tuple[Rigid, int | None]:
-        """Return the pose of a frame in another at a time."""
-        return self._buffer.lookup(target, source, stamp)
+                self.add(parent, child, nanoseconds(transform.header.stamp), pose, is_static)
