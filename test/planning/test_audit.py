@@ -351,4 +351,5 @@ def test_the_audit_shares_no_code_with_the_planner():
     libraries = {"math", "dataclasses", "weakref", "collections.abc", "itertools", "typing", "numpy", "shapely"}
     # Of curves only the types, for a type checker.
     assert imported - {f".{file.stem}" for file in own} - libraries == {
-        "..curves.dubins", "..curves.path", "..hooks", "..maps.model", "..option", "..problem", "..text", "..vehicle"}
+        "..curves.dubins", "..curves.path", "..hooks", "..maps.model", "..option", "..problem", "..settings", "..text",
+        "..vehicle"}

@@ -193,4 +193,4 @@ def test_a_problem_takes_its_options_with_their_defaults():
 
 def test_all_errors_have_one_base():
     raised = [item for item in vars(planning).values() if isinstance(item, type) and issubclass(item, Exception)]
-    assert len(raised) == 11 and all(issubclass(error, planning.PlanningError) for error in raised)
+    assert len(raised) == 12 and all(issubclass(error, planning.PlanningError) for error in raised)

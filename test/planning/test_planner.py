@@ -197,7 +197,8 @@ def test_goal_with_tolerance(planner, tolerance):
     figures = f"{off:.3f} m from the goal{heading}" if heading else f"{off:.3f} m and {turned:.3f} rad from the goal"
     assert f"it ends {figures}" in result.message
     assert result.length >= result.lower_bound
-    assert result.lower_bound == pytest.approx(math.dist(START[:2], GOAL[:2]) - problem.goal_tolerance_xy)
+    straight = math.dist(START[:2], GOAL[:2]) - problem.goal_tolerance_xy  # which the proof beside the search may raise
+    assert result.lower_bound >= straight - 1e-6
 
 
 def test_a_fresh_seed_is_reported_and_repeats(planner):
