@@ -7,6 +7,7 @@ from threading import Event
 
 import numpy as np
 import pytest
+from support.buildings import office
 from support.cases import needs_compiled, scaled
 from support.yard import GOAL, IN_THE_BOX, IN_THE_CHAMBER, START, yard
 
@@ -26,7 +27,7 @@ from dubins_rrt_ros.planning.audit import audit_path
 from dubins_rrt_ros.planning.audit.verdict import passing_findings
 from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.deadline import OutOfTime
-from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
+from dubins_rrt_ros.planning.search.legs import Leg, cheapest_chain, first_impassable
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
@@ -224,6 +225,24 @@ def test_the_audit_finds_a_waypoint_that_is_not_passed(world):
     assert not list(passing_findings(path, [(*BELOW, None), (*BELOW, None), (*ABOVE, None)]))
     for wrong in ([(*ABOVE, None), (*BELOW, None)], [(5.0, 3.001, None)], [(*BELOW, 9.0)]):
         assert "does not pass waypoint" in next(passing_findings(path, wrong))
+
+
+@needs_compiled
+def test_a_leg_whose_path_is_known_has_one_between_the_ends_of_that_path():
+    """Where the cheapest ways onto the path and off it cross, too."""
+    vehicle = Vehicle(1.0, 0.3)
+    world = prepare(office(4, seed=3), vehicle)
+    rng = np.random.default_rng(5)
+    draws = np.column_stack([rng.uniform(0.5, 19.5, (200, 2)), rng.uniform(-math.pi, math.pi, 200)]).tolist()
+    free = [pose for pose in map(tuple, draws) if world.field.pose_is_free(pose, vehicle)]
+    for start, goal in list(zip(free[::2], free[1::2], strict=False))[:10]:
+        path = plan(Problem(world, start=start, goal=goal), Settings(planner="rrt", planning_time=1.0, seed=1)).path
+        leg = Leg([start], [goal], world.field, vehicle)
+        leg.decide(0, 0)
+        if path and leg.has_obstacles:
+            leg.add(path)
+            assert leg.path(0, 0).length <= path.length + 1e-9
+            assert audit_path(leg.path(0, 0), Problem(world, start=start, goal=goal)).ok
 
 
 def test_the_cheapest_chain_is_that_of_all_chains():

@@ -43,6 +43,21 @@ class KnownPath:
         self._checker = field.collision_checker(vehicle)
 
     @property
+    def start(self) -> Pose:
+        """The first pose of the path."""
+        return self._path.start
+
+    @property
+    def end(self) -> Pose:
+        """The last pose of the path."""
+        return self._path.end
+
+    @property
+    def last(self) -> int:
+        """The index of the last pose of the path."""
+        return len(self._along) - 1
+
+    @property
     def cost(self) -> float:
         """The cost of the whole path [m]."""
         return float(self._along[-1])
@@ -78,7 +93,7 @@ class KnownPath:
 
     def to_end(self, start: Pose, first: int) -> Path:
         """Return the path from a start that joins this one at its pose `first`."""
-        return self.between(start, first, self._path.end, len(self._along) - 1)
+        return self.between(start, first, self.end, self.last)
 
     def _cheapest(self, poses: Sequence[Pose], rest: np.ndarray, onto_path: bool) -> Junctions:
         costs, indices = np.empty(len(poses)), np.empty(len(poses), np.int32)

@@ -28,11 +28,42 @@ SLICES = 16
 
 
 class _Known(NamedTuple):
-    """A known path of a leg, with the junctions for each heading at either end."""
+    """A known path of a leg, and what of it is driven between each two headings at its ends.
+
+    Attributes:
+        path: the path.
+        costs: (starts, ends) float64, with the curves onto it and off it [m]; infinite where none is free.
+        first, last: (starts, ends) int32, the indices of its poses where these end and begin.
+    """
 
     path: KnownPath
-    onto: Junctions
-    off: Junctions
+    costs: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+
+    @classmethod
+    def of(cls, path: KnownPath, starts: Sequence[Pose], ends: Sequence[Pose]) -> "_Known":
+        """Find how to get onto a path from each of some poses, and off it to each of some others."""
+        onto, off = path.onto(starts), path.off(ends)
+        own = Junctions(np.where([pose == path.start for pose in starts], path.cost, math.inf), np.zeros(len(starts), np.int32))
+        end = Junctions(np.where([pose == path.end for pose in ends], path.cost, math.inf),
+                        np.full(len(ends), path.last, np.int32))
+        known = cls(path, *_pairs(onto, off, path.cost))
+        # On a short path what is cheapest at either end may cross; then its own ends will do.
+        for begin, finish in ((onto, end), (own, off), (own, end)):
+            others = cls(path, *_pairs(begin, finish, path.cost))
+            better = np.isinf(known.costs) & np.isfinite(others.costs)
+            for mine, theirs in zip(known[1:], others[1:], strict=True):
+                mine[better] = theirs[better]
+        return known
+
+
+def _pairs(onto: Junctions, off: Junctions, cost: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return costs and indices for each two junctions, where the first is not behind the second."""
+    costs = onto.costs[:, None] + off.costs - cost
+    first, last = (np.array(indices) for indices in np.broadcast_arrays(onto.indices[:, None], off.indices))
+    costs[first > last] = math.inf
+    return costs, first, last
 
 
 class Leg:
@@ -76,12 +107,8 @@ class Leg:
 
     def add(self, path: Path) -> None:
         """Take another path of this leg into account, between any headings."""
-        known = KnownPath(path, self._field, self._vehicle)
-        onto, off = known.onto(self.starts), known.off(self.ends)
-        over = onto.costs[:, None] + off.costs - known.cost
-        over[onto.indices[:, None] > off.indices] = math.inf
-        self._known.append(_Known(known, onto, off))
-        self._over_known = np.minimum(self._over_known, over)
+        self._known.append(_Known.of(KnownPath(path, self._field, self._vehicle), self.starts, self.ends))
+        self._over_known = np.minimum(self._over_known, self._known[-1].costs)
         self.costs = np.minimum(self._curves, self._over_known)
 
     def path(self, i: int, j: int) -> Path:
@@ -89,10 +116,8 @@ class Leg:
         start, end = self.starts[i], self.ends[j]
         if self.is_curve(i, j):
             return Path.of_curves(start, end, [dubins.shortest(start, end, self._vehicle.turning_radius)])
-        over = [known.onto.costs[i] + known.off.costs[j] - known.path.cost if known.onto.indices[i] <= known.off.indices[j]
-                else math.inf for known in self._known]
-        known = self._known[int(np.argmin(over))]
-        return known.path.between(start, int(known.onto.indices[i]), end, int(known.off.indices[j]))
+        known = min(self._known, key=lambda known: known.costs[i, j])
+        return known.path.between(start, int(known.first[i, j]), end, int(known.last[i, j]))
 
     def _check(self, pairs: np.ndarray, may_be_free: bool = True) -> None:
         """Check the curves between (n, 2) pairs of indices; they count as blocked where there is no time for that."""
