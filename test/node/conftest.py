@@ -94,9 +94,15 @@ def module_planners():
     yield from _planners()
 
 
-def _planners():
+@pytest.fixture
+def installed_planners():
+    """The same by the installed command, where start, end and signals of the interpreter count too."""
+    yield from _planners(installed=True)
+
+
+def _planners(installed: bool = False):
     pytest.importorskip("rclpy", reason="rclpy is not installed")
     from support.harness import Planners
-    planners = Planners()
+    planners = Planners(installed)
     yield planners
     planners.close()

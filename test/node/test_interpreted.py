@@ -9,9 +9,9 @@ from dubins_rrt_ros.planning import kernels_compiled
 pytestmark = pytest.mark.skipif(kernels_compiled, reason="the kernels are compiled")
 
 
-def test_the_node_warns_once_and_plans(planners, map_yaml):
-    process = planners.start(map_file=str(map_yaml), samples=60, planning_time=120.0, seed=1)
-    client = planners.client()
+def test_the_node_warns_once_and_plans(installed_planners, map_yaml):
+    process = installed_planners.start(map_file=str(map_yaml), samples=60, planning_time=120.0, seed=1)
+    client = installed_planners.client()
     client.send("start_pose", (1.5, 5.0, 0.0))
     for plan_id in (1, 2):
         client.send("goal_pose", (3.5, 5.0, 0.0))

@@ -30,8 +30,8 @@ LARGE = 4000
 
 # The command line
 
-def test_the_help_lists_every_parameter(planners):
-    process = planners.start("--", "--help")
+def test_the_help_lists_every_parameter(installed_planners):
+    process = installed_planners.start("--", "--help")
     assert process.wait() == 0
     assert process.output.startswith("usage: planner")
     for item in OPTIONS.values():
@@ -93,10 +93,10 @@ def assert_ends_with_one_line(process, words):
     assert [word for word in words if word not in lines[0]] == [], lines[0]
 
 
-def test_a_broken_map_file_ends_it_with_one_line(planners, map_yaml):
+def test_a_broken_map_file_ends_it_with_one_line(installed_planners, map_yaml):
     broken = map_yaml.with_name("broken.yaml")
     broken.write_text(map_yaml.read_text().replace("resolution: 0.1", "resolution: -0.1"))
-    assert_ends_with_one_line(planners.start(map_file=str(broken)), ["broken.yaml", "resolution", "-0.1", "above 0"])
+    assert_ends_with_one_line(installed_planners.start(map_file=str(broken)), ["broken.yaml", "resolution", "-0.1", "above 0"])
 
 
 @pytest.mark.slow
@@ -238,16 +238,16 @@ STATES = [waits_for_a_map, waits_for_a_start, is_idle, plans_to_a_goal, serves_r
 @pytest.mark.slow
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("state", STATES)
-def test_a_signal_ends_it_whatever_it_does(planners, map_yaml, noise_yaml, state, by):
-    process = state(planners, map_yaml, noise_yaml)
+def test_a_signal_ends_it_whatever_it_does(installed_planners, map_yaml, noise_yaml, state, by):
+    process = state(installed_planners, map_yaml, noise_yaml)
     assert_ended(process, process.end(by))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("state", [is_idle, plans_to_a_goal, prepares_a_large_map])
-def test_a_second_signal_does_not_break_off_the_end(planners, map_yaml, noise_yaml, state, by):
-    process = state(planners, map_yaml, noise_yaml)
+def test_a_second_signal_does_not_break_off_the_end(installed_planners, map_yaml, noise_yaml, state, by):
+    process = state(installed_planners, map_yaml, noise_yaml)
     assert_ended(process, process.end(by, again_after=0.01))
 
 

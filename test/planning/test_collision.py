@@ -80,7 +80,7 @@ def test_curves_and_poses_as_brute_force_sees_them(kind, outline):
     shapely.prepare(blocked)
     vehicle = Vehicle(turning_radius=float(rng.uniform(1, 3)), footprint=OUTLINES[outline])
     fastest = 1 + vehicle.robot_radius / vehicle.turning_radius
-    for curve in random_curves(rng, map_, clearance, vehicle.turning_radius, scaled(25, least=6)):
+    for curve in random_curves(rng, map_, clearance, vehicle.turning_radius, scaled(12, least=6)):
         gap = shapely.distance(placed(vehicle.footprint, curve.start), blocked)
         assert gap > 0 if field.pose_is_free(curve.start, vehicle) else gap < ENOUGH
         least = least_gap(curve, vehicle.footprint, blocked)

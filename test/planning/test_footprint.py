@@ -49,7 +49,7 @@ def test_a_footprint_is_covered(kind):
 
 
 @pytest.mark.slow
-@settings(max_examples=scaled(100, least=10))
+@settings(max_examples=scaled(40, least=10))
 @given(st.lists(st.tuples(st.floats(0, math.tau), st.floats(0.05, 3)), min_size=3, max_size=9, unique_by=lambda polar: polar[0]))
 def test_any_footprint_is_covered(corners):
     outline = [[r * math.cos(angle), r * math.sin(angle)] for angle, r in sorted(corners)]

@@ -32,7 +32,7 @@ KINDS = {"rrt": {"planner": "rrt"}, "rrt_star": {"planner": "rrt_star"},
          "plain rrt": {"planner": "rrt", **PLAIN}, "plain rrt_star": {"planner": "rrt_star", **PLAIN},
          "short edges": {"planner": "rrt_star", "step_size": 0.5}}
 #: Of random problems, how many are looked at of each kind.
-PROBLEMS = scaled(12, least=2)
+PROBLEMS = scaled(8, least=2)
 
 coordinates = st.floats(-20, 20)
 poses = st.tuples(coordinates, coordinates, st.floats(-7, 7))
@@ -67,7 +67,7 @@ def test_tree_and_path_hold_after_every_step(kind, seed):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(PROBLEMS))
 def test_answers_hold_and_those_on_the_way_to_them(kind, seed):
-    plan(a_problem(seed), Settings(samples=scaled(600, least=60), planning_time=1.0, seed=seed, **KINDS[kind]),
+    plan(a_problem(seed), Settings(samples=scaled(600, least=60), planning_time=0.3, seed=seed, **KINDS[kind]),
          on_progress=lambda progress: progress.snapshot().check()).check()
 
 

@@ -10,7 +10,10 @@ from support.naive import drive, points_along
 from dubins_rrt_ros.planning import Settings, Status, audit_path, plan
 
 POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIMEOUT, Status.NO_VALID_PATH}
-COUNT = 150 if SCALE == 1 else 15
+#: Number of problems of each algorithm.
+COUNT = scaled(100, least=15)
+#: A search without a path goes on until this [s].
+PATIENCE = 0.15 if SCALE == 1 else 20.0
 
 
 @pytest.mark.parametrize(("planner", "count"), [
@@ -20,7 +23,7 @@ def test_random_problems(planner, count):
     statuses = []
     for seed in range(count):
         problem, clearance = random_problem(rng, random_maps(30)[seed % 30])
-        settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=1.0 if SCALE == 1 else 20.0,
+        settings = Settings(planner=planner, samples=scaled(600, least=60), seed=seed, planning_time=PATIENCE,
                             step_size=float(rng.choice([0.0, 0.0, 1.0])),
                             heading_sampling=str(rng.choice(["uniform", "goal", "field", "mixed"])),
                             informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6))

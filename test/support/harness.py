@@ -4,25 +4,27 @@ import math
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
 
+from support.forked import ForkedPlanner
+
 DEADLINE = 20.0
 
 
 class NodeProcess:
-    """The installed planner as a process of its own."""
+    """The planner as a process of its own: forked, or by a command."""
 
     def __init__(self, namespace: str, arguments: list[str], command: list[str] | None = None):
-        from dubins_rrt_ros.cli.demo.process import planner_command
-
         self.name = f"{namespace}/planner"
-        self._process = subprocess.Popen(
-            [*(command or planner_command()), "--ros-args", "-r", f"__ns:={namespace}", *arguments], text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "PYTHONUNBUFFERED": "1"})
+        arguments = ["--ros-args", "-r", f"__ns:={namespace}", *arguments]
+        self._process = ForkedPlanner(arguments) if command is None else subprocess.Popen(
+            [*command, *arguments], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"})
         self._lines: list[str] = []
         self._heard = threading.Condition()
         self._reader = threading.Thread(target=self._read)
@@ -279,11 +281,19 @@ class Client:
 
 
 class Planners:
-    """Starts planners and clients; ends all of them."""
+    """Starts planners and clients; ends all of them.
+
+    A planner that is started without a command is forked; with `installed`, and where a workspace brings the command, it is the
+    installed command, in an interpreter of its own.
+    """
 
     _count = 0
 
-    def __init__(self):
+    def __init__(self, installed: bool = False):
+        from dubins_rrt_ros.cli.demo.process import planner_command
+
+        command = planner_command()
+        self._command = command if installed or Path(command[0]).parent != Path(sys.executable).parent else None
         self._processes: list[NodeProcess] = []
         self._clients: list[Client] = []
 
@@ -297,7 +307,7 @@ class Planners:
     def restart(self, *arguments: str, command: list[str] | None = None, **parameters) -> NodeProcess:
         """Another planner in the namespace of the last."""
         rules = [part for name, value in parameters.items() for part in ("-p", f"{name}:={_yaml(value)}")]
-        self._processes.append(NodeProcess(self._namespace, [*rules, *arguments], command))
+        self._processes.append(NodeProcess(self._namespace, [*rules, *arguments], command or self._command))
         return self._processes[-1]
 
     def client(self, listens_to_tree: bool = False) -> Client:
