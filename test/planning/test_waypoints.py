@@ -235,10 +235,11 @@ def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_
     rng = np.random.default_rng(5)
     draws = np.column_stack([rng.uniform(0.5, 24.5, (100, 2)), rng.uniform(-math.pi, math.pi, 100)]).tolist()
     free = [pose for pose in map(tuple, draws) if world.field.pose_is_free(pose, vehicle)]
+    settings = Settings(planner="rrt", planning_time=2.0, seed=1)
     for start, waypoint, goal in zip(free[:9:3], free[1::3], free[2::3], strict=False):
         legs = [Problem(world, start=here, goal=there) for here, there in ((start, waypoint), (waypoint, goal))]
-        if all(plan(leg, Settings(planner="rrt", planning_time=2.0, seed=1)).solved for leg in legs):
-            assert plan_through(Problem(world, start=start, goal=goal), [waypoint], Settings(planner="rrt", planning_time=2.0, seed=1)).solved
+        if all(plan(leg, settings).solved for leg in legs):
+            assert plan_through(Problem(world, start=start, goal=goal), [waypoint], settings).solved
 
 
 def test_the_cheapest_chain_is_that_of_all_chains():
