@@ -89,6 +89,7 @@ class _Call:
         self._samples_reported = 0
         self._problem, self._settings, self._on_progress, self._seed_path = problem, settings, on_progress, seed_path
         self._deadline = Deadline(settings.planning_time, cancel)
+        self._limit, self._before = settings.planning_time, 0.0  # of the request, and its time before this call [s]
         self._root = Tree.of_root(problem.start, problem.vehicle.turning_radius)
         self._bound = self._cost_bound = lower_bound(problem)
         self._obstacles: Obstacles | None = None  # until the world is ready
@@ -138,10 +139,10 @@ class _Call:
         if departure.path is None:
             return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
         whole = WholePlans(self._problem, self._settings, departure, world, self._deadline)
-        found = plan(whole.rest, replace(self._settings, planning_time=whole.time_for_rest), cancel=self._deadline.cancel,
-                     seed_path=self._seed_path, on_progress=lambda report: self._on_progress(whole.progress(report)),
-                     report_samples=self._report_samples)
-        return replace(whole.joined(found), map_time=self._map_time)
+        rest = _Call(whole.rest, replace(self._settings, planning_time=whole.time_for_rest), self._deadline.cancel,
+                     lambda report: self._on_progress(whole.progress(report)), self._report_samples, self._seed_path)
+        rest._limit, rest._before = self._settings.planning_time, self._elapsed
+        return replace(whole.joined(rest.answer()), map_time=self._map_time)
 
     def _is_cancelled(self) -> bool:
         self._deadline.poll()
@@ -347,7 +348,7 @@ class _Call:
         if search.done:
             what, more = "No path found", "samples"
         else:
-            what, more = f"No path within planning_time {self._settings.planning_time:g} s", "time"
+            what, more = f"No path within planning_time {self._limit:g} s", "time"
         try:
             why, location = explain.after_search(self._problem, field, tree, more, self._deadline.check)
         except OutOfTime:
@@ -373,7 +374,7 @@ class _Call:
     def _drawn(self, samples: int, nodes: int) -> str:
         tree = f"{nodes} tree node{'' if nodes == 1 else 's'}"
         of_budget = f" of {self._settings.samples}" if samples <= self._settings.samples else ""
-        return f"{samples}{of_budget} samples drawn, {tree}, {self._elapsed:.3g} s"
+        return f"{samples}{of_budget} samples drawn, {tree}, {self._before + self._elapsed:.3g} s"
 
     def _with_path(self, best: AuditedPath, cancelled: bool = False, running: bool = False) -> Plan:
         """Return the plan with a path that passed its audit."""

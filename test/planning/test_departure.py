@@ -1,6 +1,7 @@
 """Starts that are too near to an obstacle: they are left by no way that comes nearer, and the audit judges just that."""
 
 import math
+import re
 import time
 from dataclasses import replace
 from itertools import pairwise
@@ -171,6 +172,19 @@ def test_the_times_are_those_since_the_request(through, monkeypatch):
     answer.check()
     assert 0.2 <= answer.time_to_found <= answer.time_to_first <= answer.planning_time
     assert all(report.elapsed >= 0.2 for report in reports)
+
+
+def test_a_timeout_tells_the_time_since_the_request(monkeypatch):
+    def found_late(*given):
+        time.sleep(0.2)
+        return departures.find_departure(*given)
+    monkeypatch.setattr(planner, "find_departure", found_late)
+    corridor = room(marks=[(x, 1.25) for x in np.arange(5.05, 10.0, 0.1)])
+    on_the_way_out = (6.0, 0.65, math.pi)  # of a corridor with one end, in which the vehicle cannot turn round
+    problem = Problem(corridor, DISC, LEAVING.start, on_the_way_out, start_slack=0.06)
+    answer = plan(problem, Settings(planning_time=0.4, seed=1))
+    assert answer.status == Status.TIMEOUT and "within planning_time 0.4 s" in answer.message
+    assert float(re.search(r"tree nodes?, ([0-9.]+) s", answer.message)[1]) >= 0.3
 
 
 def test_a_whole_path_is_audited_once(monkeypatch):
