@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import shapely
 
 from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
-from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, to_document
+from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request, to_document
 from dubins_rrt_ros.planning.text import LONGEST
 
 FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "cost",
@@ -46,6 +47,12 @@ def test_the_document_has_the_promised_fields(answer):
     assert document["map"] == "hall.wkt" and document["map_id"] == answer.problem.map.id
     assert document["settings"] == values(answer.problem) | values(answer.settings)
     assert document["tree_nodes"] > 1 and document["samples"] == answer.samples and document["seed"] == 4
+
+
+def test_the_reference_names_every_field(answer):
+    reference = (Path(__file__).resolve().parents[2] / "docs/reference.md").read_text("utf-8")
+    names = (*through_json(answer), "waypoints", "waypoint_indices", *HOOKS)
+    assert [name for name in names if f"`{name}`" not in reference] == []
 
 
 def test_the_figures_read_back_bit_for_bit(answer):
