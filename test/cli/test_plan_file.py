@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import shapely
 
-from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, plan, values
+from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, load_map, plan, values
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
 from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request, to_document
 from dubins_rrt_ros.planning.text import LONGEST
@@ -142,3 +143,16 @@ def test_a_document_with_a_wrong_curve_names_the_field(answer, curve, names):
 def test_a_curve_that_is_none_of_ours_is_read(answer):
     curve = DubinsCurve(tuple(map(float, FINE["start"])), FINE["radius"], FINE["word"], tuple(map(float, FINE["lengths"])))
     assert read_path(changed(answer, curves=[FINE], poses=[list(curve.start), list(curve.end)])).length == 2.0
+
+
+def test_a_plan_of_functions_is_not_planned_again_by_the_command(tmp_path, capsys):
+    place = (2.0, 2.0, 0.0)
+    answer = plan(Problem(load_map("maze"), Vehicle(), place, place, is_free=lambda poses: poses[:, 0] < 9), Settings(seed=1))
+    assert answer.path is not None, answer.message
+    file = tmp_path / "plan.json"
+    file.write_text(json.dumps(to_document(answer, "maze")))
+    assert main(["plan", "--replay", str(file)]) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and "it was planned with is_free" in error and "a function, which no file holds" in error
+    assert main(["audit", str(file), "maze"]) == 0
+    assert "Not judged: " in (out := capsys.readouterr().out) and "is_free" in out
