@@ -82,7 +82,7 @@ class PlanRequest:
         settings: how to plan.
         world: the problem's map, once it is prepared.
         check_invariants: True if every answer is checked, improvements too.
-        seed_path: what the search begins with, as `plan` takes it; not used where there are waypoints.
+        seed_path: what the search begins with, as `plan` and `plan_through` take it.
     """
 
     locate: Callable[[], Route]
@@ -117,11 +117,8 @@ class PlanRequest:
                 if snapshot.path is not None:
                     improved(self._checked(snapshot))
 
-        if route.waypoints:
-            search = partial(plan_through, problem, route.waypoints)
-        else:
-            search = partial(plan, problem, seed_path=self.seed_path)
-        return self._checked(search(self.settings, cancel=cancelled, on_progress=on_progress))
+        search = partial(plan_through, problem, route.waypoints) if route.waypoints else partial(plan, problem)
+        return self._checked(search(self.settings, cancel=cancelled, on_progress=on_progress, seed_path=self.seed_path))
 
     def _checked(self, answer: Plan) -> Plan:
         if self.check_invariants:

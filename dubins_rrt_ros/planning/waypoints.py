@@ -7,10 +7,10 @@ share of the samples, and the headings are turned once more.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ._kernels import COMPILED
 from .answer import not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
-from .curves.angles import heading_error, position_error, wrap
+from .curves.angles import wrap
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
@@ -33,10 +33,9 @@ from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
+from .stops import HEADINGS, Stop, legs_along, passing_indices, stops_of
 from .world import problem_with_costs, world_of
 
-#: Number of headings that are tried at a waypoint.
-HEADINGS = 72
 #: Number of headings at either end with which a leg between obstacles is planned first.
 FIRST_HEADINGS = 12
 #: Maximum number of times that legs are planned between the headings that were chosen, and the headings chosen again.
@@ -47,20 +46,9 @@ DRAFT_EXPANSIONS, STEP = (8192, 512) if COMPILED else (512, 32)
 TURNS, TRIES = (math.tau / HEADINGS, math.tau / HEADINGS / 8, math.tau / HEADINGS / 64), 33
 
 
-class _Stop(NamedTuple):
-    """A place that the path passes.
-
-    Attributes:
-        poses: one for each heading with which the vehicle may pass it.
-        waypoints: indices of the waypoints that are there; none at the start and at the goal, unless they are waypoints too.
-    """
-
-    poses: list[Pose]
-    waypoints: tuple[int, ...]
-
-
 def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], settings: Settings | None = None, *,
-                 cancel: Callable[[], bool] | None = None, on_progress: Callable[[Progress], None] | None = None) -> Plan:
+                 cancel: Callable[[], bool] | None = None, on_progress: Callable[[Progress], None] | None = None,
+                 seed_path: Path | None = None) -> Plan:
     """Plan a path from start to goal over waypoints, in their order.
 
     Args:
@@ -69,6 +57,8 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
             that equals the one before, or the start, is passed there.
         settings: as for `plan`; the legs share the samples.
         cancel, on_progress: as for `plan`.
+        seed_path: a path that passes the waypoints, with other obstacles or from another start; what is free of it between two
+            of them is what their leg begins with.
 
     Returns:
         A Plan with one audited path, whose `waypoint_indices` tell where it passes the waypoints; or with a message that names
@@ -78,7 +68,7 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
         HookError, InvalidPose: a function of the user's is wrong, as `plan` says; a waypoint is none.
     """
     waypoints = tuple(checked_waypoint(f"waypoint {number}", pose) for number, pose in enumerate(poses, 1))
-    call = _Call(problem, waypoints, with_seed(settings or Settings()), cancel or never, on_progress)
+    call = _Call(problem, waypoints, with_seed(settings or Settings()), cancel or never, on_progress, seed_path)
     answer = call.answer()
     call.world.field.raise_test_error()
     return replace(answer, waypoints=waypoints)
@@ -88,7 +78,7 @@ class _Call:
     """One call of plan_through(), with its clock."""
 
     def __init__(self, problem: Problem, waypoints: tuple[Waypoint, ...], settings: Settings, cancel: Callable[[], bool],
-                 on_progress: Callable[[Progress], None] | None):
+                 on_progress: Callable[[Progress], None] | None, seed_path: Path | None):
         self._waypoints, self._settings, self._cancel, self._on_progress = waypoints, settings, cancel, on_progress
         self._clock = Deadline(settings.planning_time, cancel)
         problem = problem_with_costs(problem, settings)
@@ -101,20 +91,21 @@ class _Call:
         self._samples = 0
         self._found_by = ""
         self._explored: set[int] = set()
+        self._seed_path, self._seeded = seed_path, set[int]()  # numbers of the legs that a part of it is a path of
         self._rng = np.random.default_rng((settings.seed, 4))  # the numbers that Smoother.simplify draws too, no others
         self._failures: dict[int, Plan] = {}  # by the id of the leg
         self._time_to_first: float | None = None
 
     def answer(self) -> Plan:
         """Choose the headings, plan the legs, and join them."""
-        stops = list(_stops(self._problem, self._waypoints))
+        stops = list(stops_of(self._problem, self._waypoints))
         if len(stops) < 3:
             return self._single_leg(stops)
         if not self.world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
             return self._leave_start(stops)
         if unreachable := self._without_room(stops):
             return unreachable
-        legs = [self._leg(here, there) for here, there in pairwise(stops)]
+        legs = self._legs(stops)
         headings = self._chosen_headings(legs)
         if headings is None:
             return self._no_path(stops, legs)
@@ -127,14 +118,14 @@ class _Call:
             return first
         return self._joined(stops, self._turned(stops, self._planned(paths)), first)
 
-    def _single_leg(self, stops: list[_Stop]) -> Plan:
+    def _single_leg(self, stops: list[Stop]) -> Plan:
         """Return the plan where all waypoints are at the start or at the goal."""
         answer = plan(self._problem, self._settings, cancel=self._cancel, on_progress=self._on_progress)
         ends = (0, len(answer.poses()) - 1)
         indices = [end for stop, end in zip(stops, ends, strict=False) for _ in stop.waypoints]
         return replace(answer, map_time=self._map_time, waypoint_indices=tuple(indices) if answer.path else ())
 
-    def _leave_start(self, stops: list[_Stop]) -> Plan:
+    def _leave_start(self, stops: list[Stop]) -> Plan:
         """Return the plan from a start that is too near to an obstacle, or why there is none."""
         occupied = self._leg_plan(self._leg(*stops[:2]))
         if occupied.status != Status.START_OCCUPIED:
@@ -145,13 +136,13 @@ class _Call:
         passed = len(stops[0].waypoints)
         whole = WholePlans(self._problem, self._settings, departure, self.world, self._clock)
         rest = plan_through(whole.rest, self._waypoints[passed:], replace(self._settings, planning_time=whole.time_for_rest),
-                            cancel=self._cancel)
+                            cancel=self._cancel, seed_path=self._seed_path)
         answer = whole.joined(rest)
         later = len(answer.poses()) - len(rest.poses())
         indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
         return replace(answer, waypoint_indices=indices, map_time=self._map_time)
 
-    def _without_room(self, stops: list[_Stop]) -> Plan | None:
+    def _without_room(self, stops: list[Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
         for n, stop in enumerate(stops):
             room = [pose for pose in stop.poses if self.world.field.pose_is_free(pose, self._problem.vehicle)]
@@ -161,7 +152,23 @@ class _Call:
             stops[n] = stop._replace(poses=room)
         return None
 
-    def _leg(self, here: _Stop, there: _Stop) -> Leg:
+    def _legs(self, stops: list[Stop]) -> list[Leg]:
+        """Return the legs, each with its part of the seed path where that is free."""
+        seed, vehicle = self._seed_path, self._problem.vehicle
+        parts = legs_along(seed, stops) if seed and seed.radius == vehicle.turning_radius else None
+        if parts is None:
+            return [self._leg(here, there) for here, there in pairwise(stops)]
+        stops[1:-1] = [stop.with_pose(part.end) for stop, part in zip(stops[1:-1], parts, strict=False)]
+        legs = [self._leg(here, there) for here, there in pairwise(stops)]
+        for n, (leg, part) in enumerate(zip(legs, parts, strict=True)):
+            if KnownPath(part, self.world.field, vehicle).is_free:
+                leg.add(part)
+                self._seeded.add(n)
+                self._found_by = "seed_path"
+        self._explored = set(self._seeded)
+        return legs
+
+    def _leg(self, here: Stop, there: Stop) -> Leg:
         return Leg(here.poses, there.poses, self.world.field, self._problem.vehicle)
 
     # Headings
@@ -172,8 +179,8 @@ class _Call:
         for _ in range(ROUNDS):
             if headings is None or self._clock.poll():
                 break
-            for leg, (i, j) in zip(legs, pairwise(headings), strict=True):
-                if not leg.is_curve(i, j):
+            for n, (leg, (i, j)) in enumerate(zip(legs, pairwise(headings), strict=True)):
+                if not leg.is_curve(i, j) and n not in self._seeded:
                     self._draft(leg, leg.starts[i], [leg.ends[j]])
             before, headings = headings, self._cheapest_headings(legs)
             if headings == before:
@@ -234,7 +241,7 @@ class _Call:
 
     # Legs
 
-    def _turned(self, stops: list[_Stop], paths: list[Path]) -> list[Path]:
+    def _turned(self, stops: list[Stop], paths: list[Path]) -> list[Path]:
         """Turn the headings that can be chosen, each where that makes its two legs cheaper, and smooth the legs."""
         for most in TURNS:
             for n, stop in enumerate(stops[1:-1], 1):
@@ -286,7 +293,7 @@ class _Call:
 
     # Answers
 
-    def _joined(self, stops: list[_Stop], paths: list[Path], before: Plan | None = None) -> Plan:
+    def _joined(self, stops: list[Stop], paths: list[Path], before: Plan | None = None) -> Plan:
         """Return the plan with the path of all legs, audited as a whole; without time for that, the path before, if any."""
         path = Path.of_curves(self._problem.start, paths[-1].end, [curve for leg in paths for curve in leg.curves])
         tree = Tree.of_path(path, self._objective.curve_costs(path))
@@ -311,7 +318,7 @@ class _Call:
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
                             roomy_share=self._objective.roomy_share(path), found_by=self._found_by,
                             cancelled=self._clock.cancelled)
-        return replace(answer, waypoint_indices=tuple(_indices(stops, paths, answer.poses())))
+        return replace(answer, waypoint_indices=tuple(passing_indices(stops, paths, answer.poses())))
 
     def _audit(self, path: Path) -> Audit:
         """Audit the path of all legs, and keep as much time for the next audit."""
@@ -329,12 +336,12 @@ class _Call:
                   for here, there in pairwise((problem.start, *self._waypoints, goal))]
         return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
 
-    def _no_path(self, stops: list[_Stop], legs: list[Leg]) -> Plan:
+    def _no_path(self, stops: list[Stop], legs: list[Leg]) -> Plan:
         """Return the plan without a path, with what is known of the first leg that has none."""
         number = first_impassable([leg.costs for leg in legs]) or 0
         return self._no_way(stops[number + 1], self._failures.get(id(legs[number])) or self._leg_plan(legs[number]))
 
-    def _no_way(self, stop: _Stop, found: Plan) -> Plan:
+    def _no_way(self, stop: Stop, found: Plan) -> Plan:
         """Return the plan without a path that says which stop is not reached, and what was found instead of a path to it."""
         root = Tree.of_root(self._problem.start, self._problem.vehicle.turning_radius)
         if self._clock.poll() and self._clock.cancelled:
@@ -356,46 +363,6 @@ class _Call:
                     time_to_found=self._time_to_first, planning_time=self._clock.elapsed, map_time=self._map_time, **more)
 
 
-def _stops(problem: Problem, waypoints: Sequence[Waypoint]) -> Iterator[_Stop]:
-    """Yield start, waypoints and goal; those at one place are one stop if one heading fits all."""
-    here: Waypoint = problem.start
-    indices: tuple[int, ...] = ()
-    goal = (*problem.goal[:2], None if problem.any_goal_heading else problem.goal[2])
-    for index, there in enumerate((*waypoints, goal)):
-        both = _common(here, there)
-        if both is None:
-            yield _Stop(_poses(here), indices)
-            indices = ()
-        here = both or there
-        indices = (*indices, index) if index < len(waypoints) else indices
-    yield _Stop(_poses(here), indices)
-
-
-def _common(here: Waypoint, there: Waypoint) -> Waypoint | None:
-    """Return the waypoint that is both at once, or None where they differ."""
-    (x, y, theta), (_, _, other) = here, there
-    if position_error((x, y, 0.0), (*there[:2], 0.0)) > SAME:
-        return None
-    if theta is None or other is None:
-        return x, y, other if theta is None else theta
-    return here if heading_error((x, y, theta), (x, y, other)) <= SAME else None
-
-
-def _poses(place: Waypoint) -> list[Pose]:
-    """Return the poses with which a waypoint may be passed."""
-    x, y, theta = place
-    headings = wrap(np.arange(HEADINGS) * (math.tau / HEADINGS)).tolist() if theta is None else [theta]
-    return [(x, y, heading) for heading in headings]
-
-
 def _is_shortest(path: Path) -> bool:
     """Return True if no path between its ends is shorter."""
     return len(path.curves) == 1 and path.length <= dubins.shortest(path.start, path.end, path.radius).length + SAME
-
-
-def _indices(stops: list[_Stop], paths: list[Path], poses: np.ndarray) -> Iterator[int]:
-    """Yield the index among the poses of a path at which it passes each waypoint."""
-    at, ends = 0, [paths[0].start, *(path.end for path in paths)]
-    for stop, end in zip(stops, ends, strict=True):
-        at += int(np.argmax((poses[at:] == end).all(axis=1)))
-        yield from [at] * len(stop.waypoints)

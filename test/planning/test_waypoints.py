@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from threading import Event
 
@@ -29,6 +30,7 @@ from dubins_rrt_ros.planning.audit.verdict import passing_findings
 from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.deadline import OutOfTime
 from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
+from dubins_rrt_ros.planning.stops import legs_along, stops_of
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
@@ -240,6 +242,42 @@ def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_
         legs = [Problem(world, start=here, goal=there) for here, there in ((start, waypoint), (waypoint, goal))]
         if all(plan(leg, settings).solved for leg in legs):
             assert plan_through(Problem(world, start=start, goal=goal), [waypoint], settings).solved
+
+
+#: Of searches that end with their first path.
+FIRST = replace(SETTINGS, planner="rrt")
+WITH_HEADINGS = [(*BELOW, 0.5), (*ABOVE, 0.5)]
+
+
+@pytest.mark.parametrize("waypoints", [WITH_HEADINGS, [BELOW, ABOVE]], ids=["headings given", "any heading"])
+def test_a_path_that_is_known_is_where_it_begins(world, waypoints):
+    problem = Problem(world, start=START, goal=GOAL)
+    rest = plan_through(problem, waypoints, FIRST).path.after(0.7)
+    again = plan_through(replace(problem, start=rest.start), waypoints, FIRST, seed_path=rest)
+    again.check()
+    assert again.found_by == "seed_path"
+    assert again.length <= rest.length + 1e-9
+
+
+def test_a_leg_of_a_known_path_that_is_blocked_is_planned_anew(world):
+    problem = Problem(world, start=START, goal=GOAL)
+    known = plan_through(problem, WITH_HEADINGS, FIRST).path
+    last = legs_along(known, list(stops_of(problem, WITH_HEADINGS)))[-1]
+    x, y, _ = last.at(np.array([0.5]))[0]
+    cells = yard()
+    cells[int(10 * y) - 1:int(10 * y) + 2, int(10 * x) - 1:int(10 * x) + 2] = 100
+    problem = Problem(GridMap(cells, 0.1), DISC, START, GOAL)
+    again = plan_through(problem, WITH_HEADINGS, FIRST, seed_path=known)
+    again.check()
+    assert_passed(again, *WITH_HEADINGS)
+    assert again.path.start == START and again.length > known.length
+
+
+def test_a_path_that_passes_other_places_is_no_seed(world):
+    problem = Problem(world, start=START, goal=GOAL)
+    other = plan(problem, FIRST).path
+    assert legs_along(other, list(stops_of(problem, WITH_HEADINGS))) is None
+    assert plan_through(problem, WITH_HEADINGS, FIRST, seed_path=other).path == plan_through(problem, WITH_HEADINGS, FIRST).path
 
 
 def test_the_cheapest_chain_is_that_of_all_chains():

@@ -9,6 +9,7 @@ from .._kernels import UNLIMITED
 from .._kernels.junctions import cheapest_junctions
 from ..collision.clearance import ClearanceField
 from ..curves import dubins
+from ..curves.dubins import DubinsCurve
 from ..curves.path import Path
 from ..problem import Pose
 from ..vehicle import Vehicle
@@ -75,10 +76,15 @@ class KnownPath:
         (_, (first,)), (_, (last,)) = self.onto([start]), self.off([goal])
         if min(first, last) < 0 or first > last:
             return None
-        curves = self._path.curves[first:last]
-        if not all(self._checker.is_motion_free(curve.start, curve.radius, curve.index, curve.lengths) for curve in curves):
-            return None
-        return self.between(start, first, goal, last)
+        return self.between(start, first, goal, last) if self._are_free(self._path.curves[first:last]) else None
+
+    @property
+    def is_free(self) -> bool:
+        """True if the whole path is free."""
+        return self._are_free(self._path.curves)
+
+    def _are_free(self, curves: Sequence[DubinsCurve]) -> bool:
+        return all(self._checker.is_motion_free(curve.start, curve.radius, curve.index, curve.lengths) for curve in curves)
 
     def between(self, start: Pose, first: int, goal: Pose, last: int) -> Path:
         """Return the path from start to goal over the path's poses from `first` to `last`."""
