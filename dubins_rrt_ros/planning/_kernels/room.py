@@ -40,8 +40,8 @@ class CornerIndex:
         """
         self.side = side
         self.rows, self.columns = int(height / side) + 1, int(width / side) + 1
-        column, row = (np.clip((points[:, k] / side).astype(np.int64), 0, count - 1)
-                       for k, count in ((0, self.columns), (1, self.rows)))
+        column = np.clip((points[:, 0] / side).astype(np.int64), 0, self.columns - 1)
+        row = np.clip((points[:, 1] / side).astype(np.int64), 0, self.rows - 1)
         bucket = row * self.columns + column
         order = np.argsort(bucket, kind="stable")
         self.points = np.ascontiguousarray(points[order], float)
