@@ -51,8 +51,9 @@ ROS = ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"]
 PLOTS = ["matplotlib>=3.6", "tqdm>=4.64"]
 PLAY = ["aiohttp>=3.8"]
 DOCS = ["sphinx>=7.2", "myst-parser>=2.0", "sphinx-rtd-theme>=2.0"]
+CLUSTER = ["distributed>=2022.12"]
 TEST = ["pytest>=7.4", "pytest-xdist>=3.2", "hypothesis>=6.98", "import-linter>=2.0", "mypy>=1.8", "types-PyYAML>=6.0",
-        "ruff>=0.6", "selenium>=4.10", *PLOTS, *PLAY]
+        "ruff>=0.6", "selenium>=4.10", *PLOTS, *PLAY, *CLUSTER]
 
 setup(
     name=PACKAGE,
@@ -79,7 +80,7 @@ setup(
     ],
     install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0"],
     # Pictures and progress bars; a robot plans without them. What dubins_rrt_ros.evaluation imports besides is the same today.
-    extras_require={"ros": ROS, "plots": PLOTS, "play": PLAY, "evaluation": PLOTS, "docs": DOCS, "test": TEST},
+    extras_require={"ros": ROS, "plots": PLOTS, "play": PLAY, "cluster": CLUSTER, "evaluation": PLOTS, "docs": DOCS, "test": TEST},
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.__main__:main",

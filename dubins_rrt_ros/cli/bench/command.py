@@ -12,6 +12,7 @@ from typing import Any
 from dubins_rrt_ros.planning import Settings
 from dubins_rrt_ros.planning.option import option
 
+from ..common.cluster import add_jobs_flags
 from ..common.flags import add_option_flags, add_paper_flag, given_settings, largest
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
@@ -22,7 +23,7 @@ from .formats import write_report
 from .problems import Case, chosen, read_cases
 from .records import Best, Runs, best_known, grouped, parse_record, read_best_known, read_runs
 from .report import summary, to_document, to_markdown
-from .runs import BenchRun, measure_all
+from .runs import BenchRun, measure_all, measure_on_cluster
 
 DEFAULT_TIME = 5.0
 MAX_SAMPLES, MAX_TIME = largest(Settings, "samples"), largest(Settings, "planning_time")
@@ -74,8 +75,8 @@ def _add_measuring(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--seeds", metavar="N", type=int, help="number of seeds per problem, from 0 to N-1; default 1")
     group.add_argument("--time", metavar="s", type=float,
                        help=f"time limit of a run [s]; default {DEFAULT_TIME:g}, or none if --samples is given")
-    group.add_argument("--jobs", metavar="N", type=int,
-                       help="number of processes; default 1, since processes that share cores distort each other's timings")
+    add_jobs_flags(group.add_mutually_exclusive_group(),
+                   "number of processes; default 1, since processes that share cores distort each other's timings")
     others = group.add_mutually_exclusive_group()
     others.add_argument("--node", action="store_true",
                         help="measure the node in place of the library, over real topics: goal to first path, get_plan, a start "
@@ -125,12 +126,15 @@ def _flags(names: Iterable[str]) -> str:
 
 
 def _measure(arguments: argparse.Namespace) -> int:
+    if "scheduler" in arguments and ("deadlines" in arguments or "node" in arguments):
+        raise UsageError("--deadlines and --node measure this machine; leave --scheduler out")
     if getattr(arguments, "deadlines", False):
         return _measure_deadlines(arguments)
     if getattr(arguments, "node", False):
         return _measure_node(arguments)
     planned, jobs = _planned_runs(arguments), _count(arguments, "jobs")
-    lines = _written(arguments.out, measure_all(planned, jobs), len(planned))
+    measured = measure_on_cluster(planned, arguments.scheduler) if "scheduler" in arguments else measure_all(planned, jobs)
+    lines = _written(arguments.out, measured, len(planned))
     runs = grouped(map(parse_record, lines))
     _write_json(arguments.json, runs, best_known(runs, {}))
     print(summary(runs), file=words_for(arguments.json))

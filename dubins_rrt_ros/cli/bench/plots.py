@@ -57,7 +57,7 @@ def draw_sample_costs(file: str, runs: Runs) -> None:
     axes.set(xscale="log", xlabel="nodes of the tree", ylabel="time for each sample [µs]")
     axes.grid(color="#dddddd", linewidth=0.6)
     for (problem, planners), colour in zip(runs.items(), cycle(COLOURS), strict=False):
-        counted = [group for group in planners.values() if all(run.samples and run.nodes for run in group)]
+        counted = [group for group in planners.values() if all(run.samples and run.nodes and run.total for run in group)]
         if counted:
             nodes, costs = np.array(sorted(map(sample_cost, counted))).T
             _draw_costs(axes, problem, nodes, costs, colour)

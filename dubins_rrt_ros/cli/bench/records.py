@@ -18,9 +18,10 @@ class RunRecord(NamedTuple):
     Attributes:
         problem, planner, seed: the problem, the planner and its seed.
         solved: True if it has a path that passed its check.
-        trace: (time [s], cost [m]) of each improvement, with falling costs; empty for a run that is not solved.
+        trace: (time [s], cost [m]) of each improvement, with falling costs; empty for a run that is not solved. Times of a run
+            on a cluster, whose machines may differ and share their cores, are infinite.
         end: time until which the result is known [s]: its limit, or its end if that was later.
-        total: duration, at most the time limit [s].
+        total: duration, at most the time limit [s]; 0 for a run on a cluster.
         samples, nodes: number of samples drawn, and of nodes of the tree; 0 where the line does not say.
         reason: why it is not solved; "" where it is, or the line does not say.
     """
@@ -71,7 +72,7 @@ def parse_record(line: Mapping[str, Any]) -> RunRecord:
     """Parse a line of `dubins_rrt bench`, or of a program that writes the same fields.
 
     The path passed its check if the field `audit` is "ok", or `verify.step_ok` is true; without either `solved` is believed.
-    `samples` and `vertices` are optional.
+    `samples` and `vertices` are optional. Lines of a cluster have `cluster`.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: a field is missing or wrong.
@@ -84,6 +85,8 @@ def parse_record(line: Mapping[str, Any]) -> RunRecord:
     if not 0 <= total < math.inf:
         raise ValueError(f"its total_s is {total:g}")
     trace = _improvements(line["trace"]) if solved else ()
+    if line.get("cluster"):
+        trace, total = tuple((math.inf, cost) for _, cost in trace), 0.0
     if solved and not trace:
         raise ValueError("it is solved, but its trace is empty")
     return RunRecord(

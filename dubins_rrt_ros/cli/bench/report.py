@@ -17,7 +17,7 @@ TITLE = "Planners compared"
 EXPLANATION = """\
 Lengths are in metres; times count from the request on, with the map prepared. Each figure is the lower median over all runs of a
 planner, in brackets the quartiles: values that were measured. A run is solved where its path passed its check; the others count
-as infinite. A dash is an infinite figure, or one at a mark that the runs were cut short before.
+as infinite. A dash is an infinite figure, one at a mark that the runs were cut short before, or a time on a cluster.
 """
 
 

@@ -9,11 +9,12 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, Vehicle, World, load_map, plan, prepare
 from dubins_rrt_ros.planning.problem import DoubtfulYaw
 
+from ..common.cluster import connected, place
 from ..common.parser import UsageError
 from .problems import Case
 
@@ -41,6 +42,23 @@ def measure_all(runs: Iterable[BenchRun], jobs: int) -> Generator[dict[str, Any]
     yield from map(measure, runs) if jobs == 1 else _from_processes(runs, jobs)
 
 
+def measure_on_cluster(runs: Iterable[BenchRun], address: str) -> Generator[dict[str, Any], None, None]:
+    """Yield the line of each run as soon as it is done, measured by the workers of a Dask cluster; maps are read here.
+
+    Raises:
+        MapError: a map cannot be used.
+        UsageError: the cluster cannot be used, or every worker that tried a run died.
+    """
+    runs = list(runs)
+    with connected(address) as cluster:
+        maps = {file: cluster.share(load_map(file)) for file in dict.fromkeys(run.case.map for run in runs)}
+        yield from cluster.run(_measure_on_host, ((run, maps[run.case.map]) for run in runs), _lost)
+
+
+def _lost(call: tuple[BenchRun, Any], what: str) -> NoReturn:
+    raise UsageError(f"{call[0].case.name} with seed {call[0].settings.seed}: {what}, perhaps for lack of memory")
+
+
 def _from_processes(runs: Iterable[BenchRun], jobs: int) -> Iterator[dict[str, Any]]:
     # Ctrl-C on a terminal reaches the processes too: with the default action they die without a trace.
     pool = ProcessPoolExecutor(jobs, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_DFL))
@@ -61,15 +79,25 @@ def _from_processes(runs: Iterable[BenchRun], jobs: int) -> Iterator[dict[str, A
 def measure(run: BenchRun) -> dict[str, Any]:
     """Plan once, and return the figures by name.
 
-    Every improvement is recorded at the time it was reported. A path that only the answer has, as when the start is the goal,
-    counts from the end of planning.
-
     Raises:
         MapError: the map cannot be used.
     """
+    return _measure_in(*_loaded(run.case.map, run.case.vehicle, run.case.allow_unknown), run)
+
+
+def _measure_on_host(run: BenchRun, world_map: Map) -> dict[str, Any]:
+    """Plan once on a worker of a cluster; return the figures, and where it was."""
+    return _measure_in(*_prepared(world_map, run.case.vehicle, run.case.allow_unknown), run) | place()
+
+
+def _measure_in(world: World, map_time: float, run: BenchRun) -> dict[str, Any]:
+    """Plan once.
+
+    Every improvement is recorded at the time it was reported. A path that only the answer has, as when the start is the goal,
+    counts from the end of planning.
+    """
     case = run.case
     warnings.simplefilter("ignore", DoubtfulYaw)  # which was said when the problems were read
-    world, map_time = _loaded(case.map, case.vehicle, case.allow_unknown)
     problem = Problem(world, start=case.start, goal=case.goal, **dict(case.request))
     trace: list[list[float]] = []
     objectives: list[float | None] = []
@@ -91,6 +119,14 @@ def _loaded(file: Path, vehicle: Vehicle, allow_unknown: bool) -> tuple[World, f
     """Load and prepare the map of a case; return it with the time taken [s]. Runs of a case follow each other: one is kept."""
     begin = time.perf_counter()
     world = prepare(load_map(file), vehicle, allow_unknown=allow_unknown)
+    return world, time.perf_counter() - begin
+
+
+@lru_cache(maxsize=4)
+def _prepared(world_map: Map, vehicle: Vehicle, allow_unknown: bool) -> tuple[World, float]:
+    """Prepare a map that a worker was sent; return it with the time taken [s]. Several are kept: workers share cases."""
+    begin = time.perf_counter()
+    world = prepare(world_map, vehicle, allow_unknown=allow_unknown)
     return world, time.perf_counter() - begin
 
 

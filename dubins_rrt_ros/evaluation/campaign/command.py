@@ -5,11 +5,12 @@ import contextlib
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from dubins_rrt_ros import __version__
+from dubins_rrt_ros.cli.common.cluster import add_jobs_flags, connected, place
 from dubins_rrt_ros.cli.common.output import check_folder, words_for, write_document
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
@@ -40,9 +41,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--problems", metavar="N", type=int, default=1000, help="number of problems; default 1000")
     parser.add_argument("--seed", metavar="S", type=int, default=0, help="seed of the problems; default 0")
     parser.add_argument("--first", metavar="K", type=int, default=0, help="number of the first problem; default 0")
-    parser.add_argument("--jobs", metavar="J", type=int, default=1,
-                        help="number of processes; with more than one, crashes and problems that take over "
-                             f"{LIMIT:g} s are reported too; default 1, this process")
+    add_jobs_flags(parser.add_mutually_exclusive_group(),
+                   f"number of processes; with more than one, crashes and problems that take over {LIMIT:g} s are reported too; "
+                   "default 1, this process")
     parser.add_argument("--out", metavar="FILE", help="write a line of JSON for each problem")
     add_json_flag(parser, "the counts, and all disagreements,")
 
@@ -50,14 +51,16 @@ def add_arguments(parser: Parser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Plan and judge, report, and return the exit status."""
     for name, least in (("problems", 1), ("seed", 0), ("first", 0), ("jobs", 1)):
-        if getattr(arguments, name) < least:
-            raise UsageError(f"--{name} is {getattr(arguments, name)}; give {least} or more")
+        given = getattr(arguments, name)
+        if given is not None and given < least:
+            raise UsageError(f"--{name} is {given}; give {least} or more")
     check_folder(arguments.out, arguments.json)
     tasks = [TrialNumber(arguments.seed, arguments.first + i) for i in range(arguments.problems)]
     lines: list[dict[str, Any]] = []
     begin = time.perf_counter()
     try:
-        lines.extend(_lines(tasks, arguments.jobs, arguments.out))
+        with contextlib.closing(_judged(tasks, arguments.jobs or 1, arguments.scheduler)) as judged:
+            lines.extend(_written(judged, len(tasks), arguments.out))
     except KeyboardInterrupt:
         _report(_counts(lines, arguments.seed, time.perf_counter() - begin), arguments.json)
         raise
@@ -65,12 +68,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if any(line["findings"] for line in lines) else 0
 
 
-def _lines(tasks: list[TrialNumber], jobs: int, file: str | None) -> Iterator[dict[str, Any]]:
-    """Yield the lines of all tasks, each written to the file as soon as it is there."""
-    running = map(judge, tasks) if jobs == 1 else run_in_processes(judge, tasks, jobs, LIMIT, _lost)
+def _judged(tasks: list[TrialNumber], jobs: int, scheduler: str | None) -> Generator[dict[str, Any], None, None]:
+    """Yield the line of each task, in any order, by processes of this machine or by the workers of a cluster."""
+    if scheduler is None:
+        yield from map(judge, tasks) if jobs == 1 else run_in_processes(judge, tasks, jobs, LIMIT, _lost)
+        return
+    with connected(scheduler) as cluster:
+        yield from cluster.run(_judge_on_host, ((task,) for task in tasks), lambda call, what: _lost(call[0], what))
+
+
+def _judge_on_host(task: TrialNumber) -> dict[str, Any]:
+    return judge(task) | place()
+
+
+def _written(running: Iterable[dict[str, Any]], count: int, file: str | None) -> Iterator[dict[str, Any]]:
+    """Yield the lines, each written to the file as soon as it is there."""
     with contextlib.ExitStack() as stack:
         out = stack.enter_context(Path(file).open("w", encoding="utf-8")) if file else None
-        for line in with_bar(running, len(tasks), " problems"):
+        for line in with_bar(running, count, " problems"):
             if out:
                 out.write(json.dumps(line) + "\n")
                 out.flush()

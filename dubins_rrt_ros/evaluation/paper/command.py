@@ -5,14 +5,16 @@ import contextlib
 import json
 import os
 import time
+from collections.abc import Generator
 from pathlib import Path
 
+from dubins_rrt_ros.cli.common.cluster import add_jobs_flags
 from dubins_rrt_ros.cli.common.extras import require_matplotlib
 from dubins_rrt_ros.cli.common.output import check_folder, finite, words_for, write_document
 from dubins_rrt_ros.cli.common.parser import Parser, UsageError, add_json_flag, describe
 from dubins_rrt_ros.cli.common.progress import with_bar
 
-from .runs import Measured, PaperRun, RunOutcome, all_runs, outcomes
+from .runs import Measured, Outcome, PaperRun, RunOutcome, all_runs, outcomes, outcomes_on_cluster
 
 SEEDS = 30
 REPORT, LINES = "report.md", "runs.jsonl"
@@ -31,35 +33,36 @@ def add_arguments(parser: Parser) -> None:
         exit_status="0 done, 2 wrong usage, 130 interrupted")
     parser.add_argument("--out", metavar="DIR", default="paper_results", help="folder to write to; default paper_results")
     parser.add_argument("--seeds", metavar="N", type=int, default=SEEDS, help=f"number of seeds, from 0 to N-1; default {SEEDS}")
-    parser.add_argument("--jobs", metavar="J", type=int, default=os.cpu_count() or 1,
-                        help="number of processes; default: the number of cores")
+    add_jobs_flags(parser.add_mutually_exclusive_group(), "number of processes; default: the number of cores")
     add_json_flag(parser, "the report's tables and its answer")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, draw, write the report, and return the exit status."""
     for name in ("seeds", "jobs"):
-        if getattr(arguments, name) < 1:
-            raise UsageError(f"--{name} is {getattr(arguments, name)}; give 1 or more")
+        given = getattr(arguments, name)
+        if given is not None and given < 1:
+            raise UsageError(f"--{name} is {given}; give 1 or more")
+    arguments.jobs = arguments.jobs or os.cpu_count() or 1
     check_folder(arguments.json)
     require_matplotlib("evaluation")
     folder, begin = Path(arguments.out), time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
-    measured = _measured(folder / LINES, arguments.seeds, arguments.jobs)
+    runs = all_runs(arguments.seeds)
+    running = outcomes(runs, arguments.jobs) if arguments.scheduler is None else outcomes_on_cluster(runs, arguments.scheduler)
+    measured = Measured(_written(folder / LINES, running, len(runs)), arguments.seeds)
     _report(folder, measured, arguments, begin)
     return 0
 
 
-def _measured(file: Path, seeds: int, jobs: int) -> Measured:
-    """Make all runs, each written to the file as soon as it is done."""
-    runs = all_runs(seeds)
+def _written(file: Path, running: Generator[Outcome, None, None], count: int) -> dict[PaperRun, RunOutcome]:
+    """Make all runs, each written to the file as soon as it is done; return their outcomes."""
     done: dict[PaperRun, RunOutcome] = {}
-    with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(outcomes(runs, jobs)) as running:
-        for run, outcome in with_bar(running, len(runs), " runs"):
-            done[run] = outcome
-            figures = {name: value if outcome.solved or name == "reach" else None for name, value in outcome._asdict().items()}
-            out.write(json.dumps(run._asdict() | figures, allow_nan=False) + "\n")
-    return Measured(done, seeds)
+    with file.open("w", 1, encoding="utf-8") as out, contextlib.closing(running):
+        for run, outcome, where in with_bar(running, count, " runs"):
+            done[run] = outcome.without_times() if where else outcome
+            out.write(json.dumps(run._asdict() | finite(outcome._asdict()) | where, allow_nan=False) + "\n")
+    return done
 
 
 def _report(folder: Path, measured: Measured, arguments: argparse.Namespace, begin: float) -> None:
@@ -69,7 +72,8 @@ def _report(folder: Path, measured: Measured, arguments: argparse.Namespace, beg
     for _ in with_bar(drawn_figures(folder, measured), figure_count(), " figures"):
         pass
     seconds = time.perf_counter() - begin
-    (folder / REPORT).write_text(to_markdown(measured, arguments.jobs, seconds), encoding="utf-8")
+    jobs = None if arguments.scheduler else arguments.jobs
+    (folder / REPORT).write_text(to_markdown(measured, jobs, seconds), encoding="utf-8")
     if arguments.json:
         write_document(arguments.json, finite({"report": str(folder / REPORT), "seconds": seconds, **to_document(measured)}))
     print(f"{headline(measured)}\n{folder / REPORT}: {len(measured.outcomes)} runs in {seconds:.0f} s",

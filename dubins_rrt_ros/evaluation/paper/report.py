@@ -60,7 +60,7 @@ QUESTION_TEXT = """\
 The paper asks what happens without a limit to the step size and with headings that always point towards the goal. Here are all
 combinations of no limit and steps of {limit:g} m, two turning radii, with headings that are uniform, that point straight towards
 the goal, or that point along the shortest way there around obstacles (the field of the cost-to-go), each with {most} samples and
-{seeds} seeds. Times are those of {jobs}; they hold the computation of the field, but not that of the map's clearance.
+{seeds} seeds. {times}
 """
 NOTE = "The two paragraphs were written from the medians of 30 seeds; the figures in them are computed from these runs."
 
@@ -72,10 +72,10 @@ def headline(measured: Measured) -> str:
             f"shorter; the paper: {_gain(*PAPERS[MOST])}")
 
 
-def to_markdown(measured: Measured, jobs: int, seconds: float) -> str:
-    """Write the report of runs that took `seconds` in `jobs` processes."""
-    at_once = "one process" if jobs == 1 else f"{jobs} processes at once"
-    made = (f"Made by `dubins_rrt paper --seeds {measured.seeds} --jobs {jobs}`, version {__version__}: {len(measured.outcomes)} "
+def to_markdown(measured: Measured, jobs: int | None, seconds: float) -> str:
+    """Write the report of runs that took `seconds` in `jobs` processes, or on a cluster."""
+    flags = "--scheduler ..." if jobs is None else f"--jobs {jobs}"
+    made = (f"Made by `dubins_rrt paper --seeds {measured.seeds} {flags}`, version {__version__}: {len(measured.outcomes)} "
             f"runs and all figures in {seconds:.0f} s. Every run is a line of `runs.jsonl`.")
     parts = ["# The paper, measured again",
              _prose(INTRODUCTION, seeds=measured.seeds, radius=TURNING_RADIUS, robot_radius=ROBOT_RADIUS),
@@ -83,10 +83,18 @@ def to_markdown(measured: Measured, jobs: int, seconds: float) -> str:
              f"## The table: length in the {MAZE} over samples", _papers_table(measured),
              _image(CONVERGENCE, "Length over samples, RRT and RRT*"), _prose(CONVERGENCE_TEXT, **_convergence(measured)),
              "## The open question: step size and headings",
-             _prose(QUESTION_TEXT, limit=LIMITED, most=MOST, seeds=measured.seeds, jobs=at_once),
+             _prose(QUESTION_TEXT, limit=LIMITED, most=MOST, seeds=measured.seeds, times=_times(jobs)),
              _question_table(measured), _image(QUESTION, "Time to the first path, and lengths, by headings and step size"),
              _prose(FOUND, **found(measured)), _prose(WHY, **why(measured)), _prose(NOTE), _prose(made)]
     return "\n\n".join(parts) + "\n"
+
+
+def _times(jobs: int | None) -> str:
+    """Say what the times of the open question are."""
+    if jobs is None:
+        return "Times are left out: the runs were made on a cluster."
+    at_once = "one process" if jobs == 1 else f"{jobs} processes at once"
+    return f"Times are those of {at_once}; they hold the computation of the field, but not that of the map's clearance."
 
 
 def to_document(measured: Measured) -> dict[str, Any]:

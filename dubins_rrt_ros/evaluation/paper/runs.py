@@ -5,9 +5,10 @@ import math
 from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import lru_cache
 from itertools import product
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from dubins_rrt_ros.cli.bench.report import median
+from dubins_rrt_ros.cli.common.cluster import connected, place
 from dubins_rrt_ros.cli.common.flags import largest
 from dubins_rrt_ros.cli.common.parser import UsageError
 from dubins_rrt_ros.planning import Path, Plan, Problem, Progress, Settings, Vehicle, load_map, plan, prepare
@@ -75,9 +76,17 @@ class RunOutcome(NamedTuple):
         """True if there is a path."""
         return math.isfinite(self.length)
 
+    def without_times(self) -> "RunOutcome":
+        """Return the outcome without its time, which was not measured on a machine like the others'."""
+        return self._replace(time_to_first=math.inf)
+
     def within(self, samples: int) -> "RunOutcome":
         """Return the outcome after this number of samples, for a run that ends with its first path."""
         return self if self.samples_to_first <= samples else _outcome_without_path(self.reach)
+
+
+#: A run, its outcome, and the fields of its line that say where on a cluster it was made.
+Outcome = tuple[PaperRun, RunOutcome, dict[str, Any]]
 
 
 class Measured:
@@ -118,7 +127,7 @@ def all_runs(seeds: int) -> list[PaperRun]:
     return [PaperRun(*kind, seed) for kind in dict.fromkeys(kinds) for seed in range(seeds)]
 
 
-def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[tuple[PaperRun, RunOutcome], None, None]:
+def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[Outcome, None, None]:
     """Yield the runs with their outcomes, in any order, measured in `jobs` processes; one is this process.
 
     Raises:
@@ -127,7 +136,21 @@ def outcomes(runs: Iterable[PaperRun], jobs: int) -> Generator[tuple[PaperRun, R
     yield from map(measure, runs) if jobs == 1 else run_in_processes(measure, runs, jobs, NO_LIMIT, _lost)
 
 
-def measure(run: PaperRun) -> tuple[PaperRun, RunOutcome]:
+def outcomes_on_cluster(runs: Iterable[PaperRun], address: str) -> Generator[Outcome, None, None]:
+    """Yield the runs with their outcomes, in any order, measured by the workers of a Dask cluster.
+
+    Raises:
+        UsageError: the cluster cannot be used, or every worker that tried a run died.
+    """
+    with connected(address) as cluster:
+        yield from cluster.run(_measure_on_host, ((run,) for run in runs), lambda call, what: _lost(call[0], what))
+
+
+def _measure_on_host(run: PaperRun) -> Outcome:
+    return *measure(run)[:2], place()
+
+
+def measure(run: PaperRun) -> Outcome:
     """Plan once."""
     samples_at_first: list[int] = []
 
@@ -138,9 +161,9 @@ def measure(run: PaperRun) -> tuple[PaperRun, RunOutcome]:
     answer = planned(run, record)
     reach = float(answer.tree.poses[:, 0].max())
     if answer.path is None or answer.time_to_first is None:
-        return run, _outcome_without_path(reach)
+        return run, _outcome_without_path(reach), {}
     return run, RunOutcome(answer.path.length, len(answer.path.curves), _full_circles(answer.path), answer.time_to_first,
-                        samples_at_first[0], reach)
+                           samples_at_first[0], reach), {}
 
 
 def planned(run: PaperRun, on_progress: Callable[[Progress], None] = lambda progress: None) -> Plan:
@@ -169,4 +192,4 @@ def _full_circles(path: Path) -> float:
 
 
 def _lost(run: PaperRun, what: str) -> NoReturn:
-    raise UsageError(f"{run.planner} in {run.environment} with seed {run.seed}: {what}; give fewer --jobs")
+    raise UsageError(f"{run.planner} in {run.environment} with seed {run.seed}: {what}; give fewer --jobs or more memory")
