@@ -80,7 +80,8 @@ setup(
     ],
     install_requires=["setuptools", "Cython>=3.0", "numpy>=1.26", "scipy>=1.11", "shapely>=2.0.3", "Pillow>=10.2", "PyYAML>=6.0"],
     # Pictures and progress bars; a robot plans without them. What dubins_rrt_ros.evaluation imports besides is the same today.
-    extras_require={"ros": ROS, "plots": PLOTS, "play": PLAY, "cluster": CLUSTER, "evaluation": PLOTS, "docs": DOCS, "test": TEST},
+    extras_require={"ros": ROS, "plots": PLOTS, "play": PLAY, "cluster": CLUSTER, "evaluation": PLOTS, "docs": DOCS,
+                    "test": TEST},
     entry_points={
         "console_scripts": [
             f"planner = {PACKAGE}.node.__main__:main",
