@@ -319,11 +319,12 @@ class GoalSession:
     def _is_wanted(self, request: _Request, plan: Plan | None) -> bool:
         """Return True if the answer to a request is to be told.
 
-        A path that nobody asked for is, where it is better than the rest of the one on display, or the vehicle has left that.
+        A path that nobody asked for is, until the goal is reached, where it is better than the rest of the one on display, or the
+        vehicle has left that.
         """
         if request.purpose is not _Purpose.REPLAN or request.has_path or self._progress is None:
             return True
-        if plan is None or plan.cost is None:
+        if plan is None or plan.cost is None or self._is_reached:
             return False
         gain = self._parameters.read().node.replan_gain
         return (plan.cost < (1 - gain) * _cost_of_rest(self._progress, plan)
