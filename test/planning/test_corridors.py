@@ -14,7 +14,7 @@ from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.curves.path import Path
 from dubins_rrt_ros.planning.search.cost import Objective
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
-from dubins_rrt_ros.planning.search.detours import ClosedPlaces, SaddleDetours, Squares
+from dubins_rrt_ros.planning.search.detours import ClosedPlaces, Landscape, SaddleDetours
 
 
 def room_with(*blocks: tuple[int, int, int, int]) -> GridMap:
@@ -45,10 +45,10 @@ def path_over(x: float, y: float) -> Path:
 @pytest.mark.parametrize(("blocks", "count"), [((), 0), ((BLOCK,), 1), (((20, 40, 35, 80), (50, 40, 65, 80)), 2)])
 def test_there_is_a_saddle_for_each_obstacle_that_is_no_wall(blocks, count):
     problem = Problem(room_with(*blocks), Vehicle(turning_radius=0.5), START, GOAL)
-    _, from_start, to_goal = costs_of(problem)
+    field, from_start, to_goal = costs_of(problem)
     nodes = from_start.kernel.nodes() + to_goal.kernel.nodes()
-    squares = Squares(problem, ClearanceField(problem.map))
-    lengths = np.where(squares.free != 0, np.minimum(nodes, UNLIMITED), UNLIMITED)
+    landscape = Landscape(problem, field, from_start, to_goal)
+    lengths = np.where(landscape.free != 0, np.minimum(nodes, UNLIMITED), UNLIMITED)
     assert len(saddles(lengths.reshape(-1), lengths.shape[1], 100.0)) == count
     assert len(saddles(lengths.reshape(-1), lengths.shape[1], 5.0)) == 0  # no way is as short
 
@@ -56,7 +56,8 @@ def test_there_is_a_saddle_for_each_obstacle_that_is_no_wall(blocks, count):
 def test_ways_over_a_node_fall_to_start_and_goal():
     problem = Problem(room_with(BLOCK), Vehicle(turning_radius=0.5), START, GOAL)
     field, from_start, to_goal = costs_of(problem)
-    squares, nodes = Squares(problem, field), (from_start.kernel.nodes(), to_goal.kernel.nodes())
+    squares = Landscape(problem, field, from_start, to_goal)
+    nodes = squares.costs
     descent = Descent(squares.free, *nodes)
     column, row = squares.places(np.array([6.0, 7.25])).astype(int)
     way = descent.way(int(row * squares.free.shape[1] + column), np.full(squares.free.size, -1, np.int32))
@@ -70,9 +71,9 @@ def test_ways_over_a_node_fall_to_start_and_goal():
 def test_a_saddle_leads_a_path_round_the_other_side():
     problem = Problem(room_with(BLOCK), Vehicle(turning_radius=0.5), START, GOAL)
     field, from_start, to_goal = costs_of(problem)
-    squares = Squares(problem, field)
+    squares = Landscape(problem, field, from_start, to_goal)
     path = path_over(6.0, 7.25).cut(0.25)  # the longer way
-    detours = SaddleDetours(problem, squares, Objective(problem.vehicle, field), from_start, to_goal, 100.0)
+    detours = SaddleDetours(problem, squares, Objective(problem.vehicle, field), 100.0)
     detour = detours.next(path)
     assert detour is not None
     column, row = squares.places(np.array([6.0, 1.5])).astype(int)
@@ -84,9 +85,10 @@ def test_a_saddle_leads_a_path_round_the_other_side():
 
 def test_a_closed_place_cuts_the_way():
     problem = Problem(room_with(BLOCK), Vehicle(turning_radius=0.5), START, GOAL)
-    field, _, _ = costs_of(problem)
+    field, from_start, to_goal = costs_of(problem)
     path = path_over(6.0, 7.25).cut(0.25)
-    places = ClosedPlaces(Squares(problem, field), np.random.default_rng(0))
+    landscape = Landscape(problem, field, from_start, to_goal)
+    places = ClosedPlaces(landscape, Objective(problem.vehicle, field), np.random.default_rng(0))
     lengths = []
     for _ in range(20):
         detour = places.next(path)
@@ -96,6 +98,16 @@ def test_a_closed_place_cuts_the_way():
         if math.dist(*ends) > 9:  # so that the place lies beside the block
             lengths.append(way)
     assert lengths and min(lengths) > 9
+
+
+@pytest.mark.parametrize("block", [(1, 40, 65, 80), (20, 40, 65, 80)])
+def test_no_place_is_closed_where_all_ways_lead_through_it(block):
+    problem = Problem(room_with(block), Vehicle(turning_radius=0.5), START, GOAL)
+    field, from_start, to_goal = costs_of(problem)
+    landscape = Landscape(problem, field, from_start, to_goal)
+    places = ClosedPlaces(landscape, Objective(problem.vehicle, field), np.random.default_rng(0))
+    detour = places.next(path_over(6.0, 7.25).cut(0.25))
+    assert (detour is None) == (block[0] == 1)  # a block at the wall leaves but one way
 
 
 def test_a_path_changes_its_corridor():

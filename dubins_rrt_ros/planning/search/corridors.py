@@ -19,7 +19,7 @@ from ..curves.path import Path
 from ..problem import Problem
 from .cost import Objective
 from .cost_to_go import CostToGo
-from .detours import ClosedPlaces, Detour, Detours, SaddleDetours, Searches, Squares
+from .detours import ClosedPlaces, Detour, Detours, Landscape, SaddleDetours, Searches
 from .hybrid_astar import FIRST_SLICE, LARGEST_SLICE, expand, new_search
 from .pace import Pace
 from .smoothing import smooth
@@ -43,16 +43,35 @@ WORTHWHILE_GAIN = 2e-4
 TOO_LONG = 1.04
 #: Number of tries that one counts as which has no shorter way, even for a disc.
 NO_WAY = 8
-#: Number of samples between two tries, and number of tries in vain after which it grows by as many. A divisor of BLOCK.
+#: Number of samples between two tries of a source, and number of tries in vain after which it grows by as many. A divisor of
+#: BLOCK.
 INTERVAL, PATIENCE = 32 if COMPILED else 512, 8
+#: Excess of the path over the shortest way around the obstacles from which on closed places are tried as often as saddles; where
+#: it is less there is less to gain, and they are tried less often in proportion.
+WIDE_GAP = 0.5
+
+
+class _Turns:
+    """When a source of detours is asked.
+
+    Attributes:
+        source: the source.
+        next_at: number of samples after which it is asked next.
+        in_vain: number of its tries in a row without a shorter path.
+    """
+
+    def __init__(self, source: Detours, samples: int):
+        self.source, self.in_vain = source, 0
+        self.next_at = samples + INTERVAL
+
+    def record(self, improved: bool, tries: int, samples: int, rarity: float) -> None:
+        """Take what came of a try, and set the next: the later the more were in vain, `rarity` times as late."""
+        self.in_vain = 0 if improved else self.in_vain + tries
+        self.next_at = samples + INTERVAL * int(rarity * (1 + self.in_vain // PATIENCE))
 
 
 class Corridors:
-    """The corridors that may be shorter than the best path; `next_path` tries one of them.
-
-    Attributes:
-        next_at: number of samples after which the next try is due.
-    """
+    """The corridors that may be shorter than the best path; `next_path` tries one of them."""
 
     def __init__(self, problem: Problem, objective: Objective, from_start: CostToGo, to_goal: CostToGo, limit: float, seed: int,
                  interrupted: Callable[[], bool], samples: int):
@@ -67,44 +86,40 @@ class Corridors:
         self._problem, self._objective, self._interrupted = problem, objective, interrupted
         self._checker, self._edge_cost = objective.field.collision_checker(problem.vehicle), objective.edge_cost()
         self._rng = np.random.default_rng((seed, 5))  # the numbers that merge_short_arcs draws too, no others
-        self._squares = Squares(problem, objective.field)
-        self._sources: list[Detours] = [SaddleDetours(problem, self._squares, objective, from_start, to_goal, limit),
-                                        ClosedPlaces(self._squares, self._rng)]  # the next one to ask is the first
-        self._in_vain = dict.fromkeys(self._sources, 0)
-        self.next_at = samples + self._interval
+        self._landscape = Landscape(problem, objective.field, from_start, to_goal)
+        self._turns = [_Turns(SaddleDetours(problem, self._landscape, objective, limit), samples),
+                       _Turns(ClosedPlaces(self._landscape, objective, self._rng), samples)]
 
     @property
     def exhausted(self) -> bool:
         """True if no detour is left, or too many were in vain."""
-        return not self._sources
+        return not self._turns
+
+    @property
+    def next_at(self) -> int:
+        """The number of samples after which the next try is due."""
+        return min(turns.next_at for turns in self._turns)
 
     def is_due(self, samples: int) -> bool:
         """Return True if a try is due after so many samples."""
         return not self.exhausted and samples >= self.next_at
 
-    @property
-    def _interval(self) -> int:
-        """The number of samples until the next try is due: the more were in vain, the more."""
-        return INTERVAL * (1 + min(self._in_vain.values()) // PATIENCE)
-
     def next_path(self, path: Path, samples: int) -> Path | None:
         """Try one more corridor, after so many samples; return the path with it, if that is shorter."""
-        shorter = self._shorter_path(path)
-        self.next_at = samples + self._interval
-        return shorter
-
-    def _shorter_path(self, path: Path) -> Path | None:
-        source = self._sources.pop(0)
+        turns = min(self._turns, key=lambda turns: turns.next_at)
+        cost = self._objective.path_cost(path)
         pieces = path.cut(PIECE * self._problem.vehicle.maneuver_scale)
-        detour = source.next(pieces)
-        if detour is None:
-            return None
-        other, tries = self._path_with(detour, pieces, source.searches)
-        gain = self._objective.path_cost(path) - self._objective.path_cost(other) if other else 0.0
-        self._in_vain[source] = 0 if gain > WORTHWHILE_GAIN * self._objective.path_cost(path) else self._in_vain[source] + tries
-        if self._in_vain[source] < source.most_in_vain:
-            self._sources.append(source)
+        detour = turns.source.next(pieces)
+        other, tries = self._path_with(detour, pieces, turns.source.searches) if detour else (None, NO_WAY)
+        gain = cost - self._objective.path_cost(other) if other else 0.0
+        turns.record(gain > WORTHWHILE_GAIN * cost, tries, samples, self._rarity(turns.source, cost))
+        if detour is None or turns.in_vain >= turns.source.most_in_vain:
+            self._turns.remove(turns)
         return other if gain > 0 else None
+
+    def _rarity(self, source: Detours, cost: float) -> float:
+        """Return how many times the interval between two tries is as long as usual."""
+        return 1.0 if source.is_finite else max(1.0, WIDE_GAP * self._landscape.least / max(cost - self._landscape.least, 1e-9))
 
     def _path_with(self, detour: Detour, path: Path, searches: Searches) -> tuple[Path | None, int]:
         """Return the path with a detour, or None, and how many tries it counts as."""

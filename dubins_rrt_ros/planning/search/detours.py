@@ -28,6 +28,10 @@ LEAST_NEW = 0.25
 MARGINS, LONGEST_BAR = (5.0, 40.0), 6.0
 #: Maximum length of a way around a closed place that is planned at first, relative to what it is to replace.
 LONGEST_WAY = 1.2
+#: Number of places that are looked at for one that may have a detour.
+PLACES = 32
+#: Minimum relative decrease of the path's cost for which the regions where no cheaper one can lead are found anew.
+CLOSE = 1e-3
 #: Share of the path between one closed place and the next, by the golden ratio, which spreads them evenly.
 NEXT_PLACE = (math.sqrt(5) - 1) / 2
 
@@ -45,91 +49,120 @@ class Detour(NamedTuple):
     free: np.ndarray
 
 
+class _Bar(NamedTuple):
+    """A row of squares from the path to a wall.
+
+    Attributes:
+        rows, columns: of the squares.
+        wall: number of the region that it ends at, or 0 where it ends before.
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    wall: int
+
+
 class Detours(Protocol):
     """A source of detours.
 
     Attributes:
         most_in_vain: number of tries in a row without a shorter path after which no more is asked for.
+        is_finite: True if each of its detours is tried once.
         searches: how a detour is planned, until it is found.
     """
 
     most_in_vain: int
+    is_finite: bool
     searches: Searches
 
     def next(self, path: Path) -> Detour | None:
         """Return one more detour of a path that is cut into short pieces, or None."""
 
 
-class Squares:
-    """The squares of the cost-to-go that are free for a vehicle.
+class Landscape:
+    """The squares of the cost-to-go that are free for a vehicle, and the lengths of the shortest ways over them.
 
     Attributes:
         free: (rows, columns) int8, not 0 for each of them.
+        costs: (rows, columns) costs of the nodes from the start, and to the goal [m].
+        lengths: (rows, columns) costs of the ways over them, about [m]; 1e300 where there are none.
+        least: the least of them.
         cells, side: their side in cells of the clearance's raster, and in metres.
         scale: length of the vehicle's manoeuvres in sides of a square.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField):
+    def __init__(self, problem: Problem, field: ClearanceField, from_start: CostToGo, to_goal: CostToGo):
+        """Take the costs, both of them bounds."""
         self.cells, self.free = field.free_squares(problem.vehicle.required_clearance)
         self.side = self.cells * field.kernel.resolution
         self.scale = problem.vehicle.maneuver_scale / self.side
         self._frame = field.frame
+        self.costs = from_start.kernel.nodes(), to_goal.kernel.nodes()
+        self.lengths = self._lengths()
+        self.least = float(self.lengths.min())
+        self._regions: np.ndarray | None = None
+        self._limit = math.inf  # of the lengths between the regions
+
+    def _lengths(self) -> np.ndarray:
+        free, nodes = self.free, sum(self.costs)
+        lengths = np.full(free.shape, UNLIMITED)
+        lengths[:-1, :-1] = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:])
+        lengths[(free == 0) | (lengths >= 0.25 * UNLIMITED)] = UNLIMITED
+        return lengths
 
     def places(self, points: np.ndarray) -> np.ndarray:
         """Return columns and rows of (..., 2) points [m]; they are whole numbers at the nodes."""
         return np.asarray(1 + self._frame.from_map(points[..., :2]) / self.side)
+
+    def regions(self, cost: float) -> np.ndarray:
+        """Return (rows, columns) int32: 0 where a path cheaper than about `cost` may lead, else the number of a region."""
+        if self._regions is None or cost < self._limit * (1 - CLOSE):
+            self._limit = cost
+            self._regions = ndimage.label(self.lengths >= cost)[0]
+        return self._regions
 
 
 class SaddleDetours:
     """Detours over saddles of the shortest ways' lengths, the one that promises most first."""
 
     most_in_vain: int = 24
+    is_finite: bool = True
     searches: Searches = (NEAR_SHORTEST, SOON)
 
-    def __init__(self, problem: Problem, squares: Squares, objective: Objective, from_start: CostToGo, to_goal: CostToGo,
-                 limit: float):
-        """Find the saddles with ways cheaper than `limit` [m]; both costs are bounds."""
-        self._squares, self._objective = squares, objective
-        costs = from_start.kernel.nodes(), to_goal.kernel.nodes()
-        self._descent = Descent(squares.free, *costs)
-        self._planned = np.zeros(squares.free.shape, np.int8)  # not 0 for each node of where it was planned
-        column, row = squares.places(np.array(problem.start)).astype(int)
-        nowhere = np.full(squares.free.size, -1, np.int32)
-        shortest = self._descent.way(row * squares.free.shape[1] + column, nowhere)
-        self._seeds = np.concatenate([shortest, saddles(self._lengths(*costs).reshape(-1), squares.free.shape[1], limit)])
-
-    def _lengths(self, from_start: np.ndarray, to_goal: np.ndarray) -> np.ndarray:
-        """Return (rows, columns) lengths of the shortest ways over squares, about [m]; 1e300 where there are none."""
-        free, nodes = self._squares.free, from_start + to_goal
-        lengths = np.full(free.shape, UNLIMITED)
-        lengths[:-1, :-1] = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:])
-        lengths[(free == 0) | (lengths >= 0.25 * UNLIMITED)] = UNLIMITED
-        return lengths
+    def __init__(self, problem: Problem, landscape: Landscape, objective: Objective, limit: float):
+        """Find the saddles with ways cheaper than `limit` [m]."""
+        self._landscape, self._objective = landscape, objective
+        self._descent = Descent(landscape.free, *landscape.costs)
+        self._planned = np.zeros(landscape.free.shape, np.int8)  # not 0 for each node of where it was planned
+        column, row = landscape.places(np.array(problem.start)).astype(int)
+        nowhere = np.full(landscape.free.size, -1, np.int32)
+        shortest = self._descent.way(row * landscape.free.shape[1] + column, nowhere)
+        self._seeds = np.concatenate([shortest, saddles(landscape.lengths.reshape(-1), landscape.free.shape[1], limit)])
 
     def next(self, path: Path) -> Detour | None:
         """Return the detour with the greatest gain by the costs in relation to its length."""
         owners, costs = self._owners(path), np.append(0.0, np.cumsum(self._objective.curve_costs(path)))
         ends, lengths, new = self._descent.measure(self._seeds, owners, self._planned.reshape(-1))
         gains = costs[ends[:, 1]] - costs[ends[:, 0]] - lengths
-        rates = gains / (lengths + 2 * MARGIN * self._squares.scale * self._squares.side)
+        rates = gains / (lengths + 2 * MARGIN * self._landscape.scale * self._landscape.side)
         rates[(ends.min(axis=1) < 0) | (new < LEAST_NEW)] = 0
         best = int(np.argmax(rates))
         if rates[best] <= 0:
             return None
         begin, end = ends[best].tolist()
-        first, last = _around(path, begin, end, MARGIN * self._squares.scale * self._squares.side)
+        first, last = _around(path, begin, end, MARGIN * self._landscape.scale * self._landscape.side)
         way = self._descent.way(int(self._seeds[best]), owners)
-        free = self._near(way, self._squares.places(path.waypoints), first, begin, end, last)
+        free = self._near(way, self._landscape.places(path.waypoints), first, begin, end, last)
         self._mark(free, way)
         return Detour(first, last, free)
 
     def _owners(self, path: Path) -> np.ndarray:
         """Return (n,) int32: the waypoint near each node, or -1."""
-        rows, columns = self._squares.free.shape
-        reach = max(1.5, APART * self._squares.scale)
+        rows, columns = self._landscape.free.shape
+        reach = max(1.5, APART * self._landscape.scale)
         steps = np.arange(-math.floor(reach), math.floor(reach) + 1)
         up, right = np.nonzero(steps[:, None]**2 + steps**2 <= reach**2)
-        places = np.rint(self._squares.places(path.waypoints)).astype(int)
+        places = np.rint(self._landscape.places(path.waypoints)).astype(int)
         row = np.clip(places[:, 1, None] + steps[up], 0, rows - 1)
         column = np.clip(places[:, 0, None] + steps[right], 0, columns - 1)
         owners = np.full((rows, columns), -1, np.int32)
@@ -138,7 +171,7 @@ class SaddleDetours:
 
     def _near(self, way: np.ndarray, places: np.ndarray, first: int, begin: int, end: int, last: int) -> np.ndarray:
         """Return the free squares near a way and the path before and behind it, but for those nearer to the path between."""
-        free, scale = self._squares.free, self._squares.scale
+        free, scale = self._landscape.free, self._landscape.scale
         rows, columns = np.divmod(way, free.shape[1])
         points = np.concatenate([_filled(places[first:begin + 1]), np.column_stack([columns, rows]),
                                  _filled(places[end:last + 1])])
@@ -158,53 +191,60 @@ class SaddleDetours:
 
 
 class ClosedPlaces:
-    """Detours around places of the path, each of which is closed from wall to wall, or as far as a bar reaches."""
+    """Detours around places of the path, each of which is closed from wall to wall, or as far as a bar reaches.
+
+    Walls are where no cheaper path can lead. Where those on both sides belong to the same region every cheaper path leads through
+    the place, and there is no detour.
+    """
 
     most_in_vain: int = 128
+    is_finite: bool = False
     searches: Searches = (SOON, NEAR_SHORTEST)
 
-    def __init__(self, squares: Squares, rng: np.random.Generator):
-        self._squares, self._rng = squares, rng
+    def __init__(self, landscape: Landscape, objective: Objective, rng: np.random.Generator):
+        self._landscape, self._objective, self._rng = landscape, objective, rng
         self._place = 0.0
 
     def next(self, path: Path) -> Detour | None:
-        """Return the detour around the next place."""
-        self._place = (self._place + NEXT_PLACE) % 1.0
+        """Return the detour around the next place that may have one."""
+        regions, arc_lengths = self._landscape.regions(self._objective.path_cost(path)), path.arc_lengths()
+        for _ in range(PLACES):
+            self._place = (self._place + NEXT_PLACE) % 1.0
+            place = int(np.searchsorted(arc_lengths, self._place * arc_lengths[-1]))
+            if 0 < place < len(arc_lengths) - 1:
+                left, right = (self._bar(path.waypoints[place], side, regions) for side in (1, -1))
+                if left.wall == 0 or left.wall != right.wall:
+                    return self._around_bar(path, place, (left, right), regions)
+        return None
+
+    def _around_bar(self, path: Path, place: int, bars: tuple[_Bar, _Bar], regions: np.ndarray) -> Detour:
         margin = math.exp(self._rng.uniform(*np.log(MARGINS)))
-        arc_lengths, metres = path.arc_lengths(), self._squares.scale * self._squares.side
-        place = int(np.searchsorted(arc_lengths, self._place * arc_lengths[-1]))
-        if not 0 < place < len(arc_lengths) - 1:
-            return None
-        first, last = _around(path, place, place, margin * metres)
-        free = self._between(path, first, last)
-        self._close(free, path.waypoints[place])
+        first, last = _around(path, place, place, margin * self._landscape.scale * self._landscape.side)
+        free = self._between(path, first, last, regions)
+        for bar in bars:
+            free[bar.rows, bar.columns] = free[bar.rows, bar.columns - 1] = 0
         return Detour(first, last, free)
 
-    def _between(self, path: Path, first: int, last: int) -> np.ndarray:
-        """Return the free squares over which a way as long as the path between two waypoints may lead: in an ellipse."""
-        free, ends = self._squares.free, self._squares.places(path.waypoints[[first, last]])
-        length = LONGEST_WAY * (path.arc_lengths()[last] - path.arc_lengths()[first]) / self._squares.side
-        reach = (length - math.hypot(*(ends[1] - ends[0]))) / 2 + 2
-        window = _window(ends, reach + 1, free.shape)
-        rows, columns = (np.arange(part.start, part.stop) + 0.5 for part in window)
-        away = sum(np.hypot(columns - column, rows[:, None] - row) for column, row in ends)
+    def _between(self, path: Path, first: int, last: int, regions: np.ndarray) -> np.ndarray:
+        """Return the free squares over which a cheaper way that is not much longer may lead between two waypoints."""
+        free, ends = self._landscape.free, self._landscape.places(path.waypoints[[first, last]])
+        length = LONGEST_WAY * (path.arc_lengths()[last] - path.arc_lengths()[first]) / self._landscape.side
+        window = _window(ends, (length - math.hypot(*(ends[1] - ends[0]))) / 2 + 3, free.shape)
         between = np.zeros_like(free)
-        between[window] = free[window] * (away <= length + 3)
+        between[window] = regions[window] == 0
         return between
 
-    def _close(self, free: np.ndarray, pose: np.ndarray) -> None:
-        """Take the squares from a pose to the walls on its left and on its right."""
-        place, neighbour = self._squares.places(np.array([pose[:2], pose[:2] + self._squares.side * np.array(
+    def _bar(self, pose: np.ndarray, side: int, regions: np.ndarray) -> _Bar:
+        """Return the squares from a pose to the wall on its left (side 1) or right (-1)."""
+        place, neighbour = self._landscape.places(np.array([pose[:2], pose[:2] + self._landscape.side * np.array(
             [-math.sin(pose[2]), math.cos(pose[2])])]))
-        left = neighbour - place
-        for side in (1, -1):
-            steps = np.arange(0, LONGEST_BAR * self._squares.scale, 0.5)
-            columns, rows = (place + side * steps[:, None] * left).astype(int).T
-            inside = (rows >= 0) & (rows < free.shape[0]) & (columns > 0) & (columns < free.shape[1])
-            columns, rows = columns[inside], rows[inside]
-            walls = np.flatnonzero(self._squares.free[rows, columns] == 0)
-            stop = walls[0] if len(walls) else len(rows)
-            free[rows[:stop], columns[:stop]] = free[rows[:stop], columns[:stop] - 1] = 0
+        steps = np.arange(0, LONGEST_BAR * self._landscape.scale, 0.5)
+        columns, rows = (place + side * steps[:, None] * (neighbour - place)).astype(int).T
+        inside = (rows >= 0) & (rows < regions.shape[0]) & (columns > 0) & (columns < regions.shape[1])
+        columns, rows = columns[inside], rows[inside]
+        walls = np.flatnonzero(regions[rows, columns])
+        stop = walls[0] if len(walls) else len(rows)
+        return _Bar(rows[:stop], columns[:stop], int(regions[rows[stop], columns[stop]]) if len(walls) else 0)
 
 
 def _around(path: Path, begin: int, end: int, margin: float) -> tuple[int, int]:
