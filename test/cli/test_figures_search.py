@@ -8,7 +8,7 @@ import pytest
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.evaluation.figures import search as figures_search
-from dubins_rrt_ros.planning import ClearanceField
+from dubins_rrt_ros.planning import ClearanceField, Settings, plan
 from dubins_rrt_ros.planning.pictures.drawing import PATH
 
 pytestmark = needs_compiled  # interpreted, they take minutes
@@ -49,8 +49,8 @@ def test_the_informed_search_is_drawn_with_its_first_path_its_final_one_and_its_
     assert first.samples == 0 and final.samples == final.settings.samples
     assert lengths_in(axes.get_title(loc="left")) == pytest.approx([first.length, final.length], abs=0.005)
     drawn = {colour: line for colour in (figures_search.FIRST, PATH) for line in lines_of(axes, colour)}
-    for colour, plan in ((figures_search.FIRST, first), (PATH, final)):
-        assert drawn[colour] == pytest.approx(plan.path.poses(figures_search.SPACING)[:, :2])
+    for colour, answer in ((figures_search.FIRST, first), (PATH, final)):
+        assert drawn[colour] == pytest.approx(answer.path.poses(figures_search.SPACING)[:, :2])
     tree = np.array([path.vertices for path in axes.collections[0].get_paths()])
     # But for what hybrid A* drove before its path was smoothed.
     assert len(tree) > 100 and (bounds.over(tree.mean(axis=1)) < first.length).mean() > 0.9
@@ -58,13 +58,15 @@ def test_the_informed_search_is_drawn_with_its_first_path_its_final_one_and_its_
 
 def test_the_bounds_that_are_drawn_bound_both_paths():
     """What is left of a path is no shorter than the cost-to-go, and the path is no shorter than what leads over its places."""
-    for plan in plans():
-        bounds = figures_search.bounds_of(plan.problem)
-        poses = plan.path.poses(0.01)
+    for answer in plans():
+        bounds = figures_search.bounds_of(answer.problem)
+        poses = answer.path.poses(0.01)
         gone = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])  # chords: never longer
-        assert (bounds.to_goal.at(poses[:, :2].copy()) <= plan.length - gone + 1e-9).all()
-        assert (bounds.over(poses[:, :2].copy()) <= plan.length + 1e-9).all()
-        assert bounds.least == pytest.approx(plans()[1].lower_bound)
+        assert (bounds.to_goal.at(poses[:, :2].copy()) <= answer.length - gone + 1e-9).all()
+        assert (bounds.over(poses[:, :2].copy()) <= answer.length + 1e-9).all()
+    assert bounds.least <= answer.lower_bound <= answer.length
+    unproved = plan(answer.problem, Settings(samples=1, seed=1, length_proof=False))
+    assert bounds.least == pytest.approx(unproved.lower_bound)
 
 
 def test_the_cost_to_go_is_drawn_where_the_vehicle_fits_in_the_colours_of_its_bar():
