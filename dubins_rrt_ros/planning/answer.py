@@ -25,7 +25,6 @@ class AuditedPath:
 
     Attributes:
         cost: the cost of the path [m].
-        roomy_share: the share of its length with room, as `Plan` has it.
         found: the best path of the search, of which this one is a simpler form, or the same.
         is_simple: False where the path was not simplified, since the first one is not to wait for that.
     """
@@ -38,7 +37,6 @@ class AuditedPath:
     cost: float = 0.0
     found: Path | None = None
     is_simple: bool = True
-    roomy_share: float | None = None
 
     def improves(self, other: "AuditedPath | None") -> bool:
         """Return True if this is worth a report after the other."""

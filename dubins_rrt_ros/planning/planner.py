@@ -101,6 +101,7 @@ class _Call:
         self._time_to_first: float | None = None
         self._time_to_found: float | None = None
         self._map_time = 0.0
+        self._objective: Objective | None = None  # until the search begins
         self._proof: BackgroundProof | None = None
 
     @property
@@ -166,6 +167,7 @@ class _Call:
         deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
                         self._report_samples)
+        self._objective = search.objective
         if search.objective.is_length:
             self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over)
         for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field))):
@@ -250,8 +252,7 @@ class _Call:
             simple = search.without_short_arcs(simple)
         self._found_cost = search.cost
         return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
-                        search.objective.path_cost(simple), path, simplify or search.objective.is_length,
-                        search.objective.roomy_share(simple))
+                        search.objective.path_cost(simple), path, simplify or search.objective.is_length)
 
     def _simplified(self, path: Path, search: Search) -> Path:
         """Return a simpler form of a path, for which there is time kept once it is known how long that takes."""
@@ -386,7 +387,8 @@ class _Call:
                                   running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
                           audit=best.audit, found_by=best.found_by, lower_bound=bound, cost=best.cost,
-                          roomy_share=best.roomy_share, cost_lower_bound=cost_bound, planning_time=elapsed)
+                          cost_lower_bound=cost_bound, planning_time=elapsed,
+                          roomy_share=self._objective.roomy_share(best.path) if self._objective else None)
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
         figures = {"lower_bound": self._bound, "cost_lower_bound": self._cost_bound, "planning_time": self._elapsed} | more

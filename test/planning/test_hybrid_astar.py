@@ -41,7 +41,7 @@ def search_on(problem, limit=1e300, arc=0.6, sectors=16, weight=1.5, most=50_000
     radius = problem.vehicle.turning_radius
     to_goal = CostToGo.to_goal(problem, field).kernel
     return HybridAStar(checker=field.collision_checker(problem.vehicle), edge_cost=EdgeCost(), radius=radius,
-                       start=problem.start, goals=np.array([problem.goal]), to_goal=to_goal, length_to_goal=to_goal,
+                       start=problem.start, goals=np.array([problem.goal]), to_goal=to_goal,
                        corner=corners.min(axis=0), extent=np.ptp(corners, axis=0), arc=arc * radius, sectors=sectors,
                        weight=weight, visit_penalty=visit_penalty, limit=limit, max_expanded=most)
 

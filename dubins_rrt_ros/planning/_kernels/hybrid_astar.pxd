@@ -12,7 +12,6 @@ cdef class HybridAStar:
     cdef EdgeCost edge_cost
     cdef double radius
     cdef CostToGoKernel to_goal
-    cdef CostToGoKernel length_to_goal
     cdef double[:, ::1] goals
     cdef double[:, ::1] goal_headings
     cdef double rounding

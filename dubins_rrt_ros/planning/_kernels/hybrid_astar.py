@@ -12,7 +12,7 @@ expanded nearby.
 
 Where the cost is the length, the curve to the goal costs what the key says, so the first one that is free is the best. Where the
 cost is another, it may cost more than the way around crowded places; the path is then kept, and the search goes on for cheaper
-ones.
+ones. The curve is tried from each pose then, since of a cost-to-go it is not known how much of it is length.
 """
 
 import cython
@@ -70,7 +70,7 @@ class HybridAStar:
     """
 
     def __init__(self, checker: CollisionChecker, edge_cost: EdgeCost, radius, start, goals, to_goal: CostToGoKernel,
-                 length_to_goal: CostToGoKernel, corner, extent, arc, sectors, weight, visit_penalty, limit, max_expanded,
+                 corner, extent, arc, sectors, weight, visit_penalty, limit, max_expanded,
                  turning_arc=None, arc_factors=None, retry_penalty=0.0, good_enough=0.0):
         """Start a search.
 
@@ -80,7 +80,7 @@ class HybridAStar:
             radius: the turning radius [m].
             start: (x, y, theta).
             goals: (m, 3) poses, any of which will do.
-            to_goal, length_to_goal: the cost-to-go around obstacles, and the length-to-go.
+            to_goal: the cost-to-go around obstacles.
             corner, extent: lowest (x, y) of the map, and its size [m].
             arc: length of an arc [m]; the cells of the closed set have sides of 0.7 of that.
             sectors: number of headings that the closed set tells apart.
@@ -95,7 +95,7 @@ class HybridAStar:
             good_enough: cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends the search.
         """
         self.checker, self.edge_cost, self.radius = checker, edge_cost, radius
-        self.to_goal, self.length_to_goal, self.goals, self.good_enough = to_goal, length_to_goal, goals, good_enough
+        self.to_goal, self.goals, self.good_enough = to_goal, goals, good_enough
         self.goal_headings = np.column_stack([np.sin(goals[:, 2]), np.cos(goals[:, 2])])
         self.rounding = max(rounding_at(corner[0], corner[1]), rounding_at(corner[0] + extent[0], corner[1] + extent[1]))
         self.arc, self.weight, self.visit_penalty, self.limit, self.max_expanded = arc, weight, visit_penalty, limit, max_expanded
@@ -264,8 +264,7 @@ class HybridAStar:
         if around >= limit or self.goals.shape[0] > 1:
             return around, True
         direct: cython.double = length_of(self.curve_to_goal(pose, 0, limit))
-        length: cython.double = around if self.edge_cost.is_length else self.length_to_goal.at(pose.x, pose.y)
-        return max(around, direct), direct >= LEAST_SHARE * length
+        return max(around, direct), direct >= LEAST_SHARE * around or not self.edge_cost.is_length
 
     def curve_to_goal(self, pose, goal, limit):
         """Return the shortest curve to a goal; its first arc is UNLIMITED where it is not shorter than `limit`."""

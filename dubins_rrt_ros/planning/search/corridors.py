@@ -36,13 +36,16 @@ SLACK, SLACK_LENGTH = 1.08, 0.5
 PROMISING = (1.06, 1.03, 1.02)
 #: Number of rounds of smoothing of the path with a detour.
 JOINT_ROUNDS = 2
-#: Minimum gain that counts, relative to the cost of the path.
-WORTHWHILE_GAIN = 2e-4
+#: Minimum gain that counts, relative to the cost of the path: where that is its length, and where it is another, which smoothing
+#: lowers a little each time.
+WORTHWHILE_GAIN, WORTHWHILE_GAIN_OF_COST = 2e-4, 2e-3
 #: Way around the obstacles, relative to what it is to replace, from which on it cannot be shorter: as computed, it can be some
 #: hundredths too long.
 TOO_LONG = 1.04
 #: Number of tries that one counts as which has no shorter way, even for a disc.
 NO_WAY = 8
+#: Number of tries that one counts as where the cost is not the length, which takes twice as long, so that half as many are made.
+TRIES_OF_COST = 2
 #: Number of samples between two tries of a source, and number of tries in vain after which it grows by as many. A divisor of
 #: BLOCK.
 INTERVAL, PATIENCE = 32 if COMPILED else 512, 8
@@ -112,10 +115,16 @@ class Corridors:
         detour = turns.source.next(pieces)
         other, tries = self._path_with(detour, pieces, turns.source.searches) if detour else (None, NO_WAY)
         gain = cost - self._objective.path_cost(other) if other else 0.0
-        turns.record(gain > WORTHWHILE_GAIN * cost, tries, samples, self._rarity(turns.source, cost))
+        worthwhile = WORTHWHILE_GAIN if self._objective.is_length else WORTHWHILE_GAIN_OF_COST
+        turns.record(gain > worthwhile * cost, self._tries_of_one * tries, samples,
+                     self._tries_of_one * self._rarity(turns.source, cost))
         if detour is None or turns.in_vain >= turns.source.most_in_vain:
             self._turns.remove(turns)
         return other if gain > 0 else None
+
+    @property
+    def _tries_of_one(self) -> int:
+        return 1 if self._objective.is_length else TRIES_OF_COST
 
     def _rarity(self, source: Detours, cost: float) -> float:
         """Return how many times the interval between two tries is as long as usual."""
@@ -124,26 +133,24 @@ class Corridors:
     def _path_with(self, detour: Detour, path: Path, searches: Searches) -> tuple[Path | None, int]:
         """Return the path with a detour, or None, and how many tries it counts as."""
         replaced = path.part(detour.first, detour.last)
-        limit = SLACK * self._objective.path_cost(replaced) + SLACK_LENGTH * self._problem.vehicle.maneuver_scale
+        cost = self._objective.path_cost(replaced)
+        limit = SLACK * cost + SLACK_LENGTH * self._problem.vehicle.maneuver_scale
         objective, required_clearance = self._objective, self._problem.vehicle.required_clearance
         to_goal = CostToGo(objective.field, required_clearance, replaced.end[:2], target=replaced.start[:2], objective=objective,
                            free=detour.free)
-        length_to_goal = to_goal if objective.is_length else CostToGo(
-            objective.field, required_clearance, replaced.end[:2], target=replaced.start[:2], free=detour.free)
-        if to_goal.at(replaced.waypoints[:1, :2])[0] >= TOO_LONG * self._objective.path_cost(replaced):
+        if to_goal.at(replaced.waypoints[:1, :2])[0] >= TOO_LONG * cost:
             return None, NO_WAY
-        found = self._found(replaced, to_goal, length_to_goal, limit, searches)
+        found = self._found(replaced, to_goal, limit, searches)
         if found is None:
             return None, 1
         for number, promising in enumerate(PROMISING):
             found = self._smoothed(found, 1, is_fresh=number == 0)
-            if self._objective.path_cost(found) > promising * self._objective.path_cost(replaced):
+            if self._objective.path_cost(found) > promising * cost:
                 return None, 1
         joint = Path.joined(path.part(0, detour.first), found, path.part(detour.last, len(path.words) - 1))
         return self._smoothed(joint, JOINT_ROUNDS), 1
 
-    def _found(self, replaced: Path, to_goal: CostToGo, length_to_goal: CostToGo, limit: float, searches: Searches
-               ) -> Path | None:
+    def _found(self, replaced: Path, to_goal: CostToGo, limit: float, searches: Searches) -> Path | None:
         """Return what hybrid A* finds in place of a part of the path."""
         vehicle = self._problem.vehicle
         for weight, visit_penalty in searches:
@@ -151,7 +158,7 @@ class Corridors:
             most = MOST_EXPANDED + int(MOST_EXPANDED_PER_ARC * limit / (arc * vehicle.maneuver_scale))
             search = new_search(self._problem, self._checker, self._edge_cost, arc, math.ceil(HEADINGS / arc), weight,
                                 visit_penalty, start=replaced.start, goals=replaced.waypoints[-1:], to_goal=to_goal.kernel,
-                                length_to_goal=length_to_goal.kernel, limit=limit, max_expanded=most)
+                                limit=limit, max_expanded=most)
             expand(search, Pace(FIRST_SLICE, LARGEST_SLICE), most, self._interrupted)
             if arrays := search.path():
                 waypoints, words, lengths = arrays

@@ -13,7 +13,7 @@ from ..settings import ROOMY, Settings
 from ..vehicle import Vehicle
 
 #: Distance between the points whose room is measured, in preferred clearances, and their maximum number.
-SPACING, MOST_POINTS = 1 / 8, 20_000
+SPACING, MOST_POINTS = 1 / 4, 5_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +85,11 @@ class Objective:
         """Return the share of a path's length with room of 0.8 preferred clearances; None where there is none of either."""
         if self.preferred_clearance == 0 or self.weight == 0 or path.length == 0:
             return None
+        enough = ROOMY * self.preferred_clearance
         points = max(1, min(math.ceil(path.length / (SPACING * self.preferred_clearance)), MOST_POINTS))
         poses, rooms = path.at((np.arange(points) + 0.5) / points), np.empty(points)
-        self.field.room(self.vehicle).rooms(np.require(poses, float, ["C", "W"]), self.preferred_clearance, rooms)
-        return float((rooms >= ROOMY * self.preferred_clearance).mean())
+        self.field.room(self.vehicle).rooms(np.require(poses, float, ["C", "W"]), enough, rooms)
+        return float((rooms >= enough).mean())
 
 
 def minimises_length(problem: Problem, settings: Settings) -> bool:

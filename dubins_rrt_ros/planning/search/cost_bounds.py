@@ -28,16 +28,14 @@ class CostBounds:
     Attributes:
         to_goal: the cost to the goal, a lower bound once `make_to_goal` has been called.
         from_start: the cost from the start, a lower bound; None until `make_from_start` has been called.
-        length_to_goal: the length to the goal, a lower bound once `make_length_to_goal` has been called.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, to_goal: CostToGo, length_to_goal: CostToGo,
-                 objective: Objective):
-        self.to_goal, self.length_to_goal, self._objective = to_goal, length_to_goal, objective
+    def __init__(self, problem: Problem, field: ClearanceField, to_goal: CostToGo, objective: Objective):
+        self.to_goal, self._objective = to_goal, objective
         self.from_start: CostToGo | None = None
         self._problem, self._field = problem, field
         self._jobs: tuple[BackgroundJob[None], BackgroundJob[CostToGo] | None] | None = None
-        self._length_job: BackgroundJob[None] | None = None
+        self._length_job: BackgroundJob[CostToGo] | None = None
         self._pruned_at = math.inf
 
     def start(self, from_start: bool = False) -> None:
@@ -45,8 +43,11 @@ class CostBounds:
         if self._jobs is None:
             self._jobs = (BACKGROUND.start(self.to_goal.prepare_bound),
                           BACKGROUND.start(self._computed_from_start) if from_start else None)
-            if self.length_to_goal is not self.to_goal:
-                self._length_job = BACKGROUND.start(self.length_to_goal.prepare_bound)
+            if not self._objective.is_length:
+                self._length_job = BACKGROUND.start(self._computed_length)
+
+    def _computed_length(self) -> CostToGo:
+        return CostToGo.to_goal(self._problem, self._field).make_bound()
 
     def _computed_from_start(self) -> CostToGo:
         return CostToGo.from_start(self._problem, self._field, self._objective).make_bound()
@@ -63,10 +64,10 @@ class CostBounds:
         return self.to_goal.make_bound()
 
     def make_length_to_goal(self) -> CostToGo:
-        """Make the length to the goal a lower bound; nothing else may use it meanwhile."""
-        if self._length_job:
-            self._length_job()
-        return self.length_to_goal.make_bound()
+        """Make the lengths to the goal, as lower bounds, or wait for them; nothing else may use `to_goal` meanwhile."""
+        if self._objective.is_length:
+            return self.make_to_goal()
+        return self._length_job() if self._length_job else self._computed_length()
 
     def make_from_start(self) -> CostToGo:
         """Make the bound from the start, or wait for it."""

@@ -47,6 +47,9 @@ NEXT_RUNS = ((0.4, 16, 1.1), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
 LATER_ARCS = 0.25, 0.6
 #: Maximum number of later runs in a row that find nothing better.
 MOST_IN_VAIN = 12
+#: Minimum gain of a run that is not in vain, relative to the best cost, where that is not the length: smoothing lowers it a
+#: little each time.
+WORTHWHILE_GAIN_OF_COST = 1e-3
 #: Maximum cost of a path that is sought, relative to the best: arcs of one length make it longer than it will be when smoothed.
 SLACK = 1.05
 #: Maximum number of poses that a run expands.
@@ -66,14 +69,13 @@ class HybridAStarRuns:
         exhausted: True if no run is left, as too many in a row were in vain.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo,
-                 length_to_goal: CostToGo | None = None):
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, to_goal: CostToGo):
         """Prepare the runs.
 
         Args:
-            to_goal, length_to_goal: cost and length to the goal; without the latter they are the same.
+            to_goal: the cost to the goal.
         """
-        self._problem, self._field, self._to_goal, self._length_to_goal = problem, field, to_goal, length_to_goal or to_goal
+        self._problem, self._field, self._to_goal = problem, field, to_goal
         self._objective = Objective.of(problem, settings, field)
         self._edge_cost = self._objective.edge_cost()
         self._checker = field.collision_checker(problem.vehicle)
@@ -143,7 +145,8 @@ class HybridAStarRuns:
         if path and not is_first and self._settings.shortcut:
             for first_round in (True, False):
                 path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, interrupted, self._objective)
-        self._count(path is not None and self._objective.path_cost(path) < best_cost, is_first)
+        worthwhile = best_cost if self._objective.is_length else (1 - WORTHWHILE_GAIN_OF_COST) * best_cost
+        self._count(path is not None and self._objective.path_cost(path) < worthwhile, is_first)
         # Not even arcs of all lengths lead anywhere from the start.
         self.exhausted = self.exhausted or (is_first and self._in_vain > len(FIRST_RUNS) and run.size == 1)
         return path
@@ -172,8 +175,7 @@ class HybridAStarRuns:
 
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
         return new_search(self._problem, self._checker, self._edge_cost, arc, headings, weight, visit_penalty,
-                          start=self._problem.start, goals=self._goals, to_goal=self._to_goal.kernel,
-                          length_to_goal=self._length_to_goal.kernel, **options)
+                          start=self._problem.start, goals=self._goals, to_goal=self._to_goal.kernel, **options)
 
     def _measures(self, is_first: bool) -> tuple[float, int, float]:
         """Return the length of the next run's arcs in turning radii, its number of headings, its weight of the cost-to-go."""

@@ -65,9 +65,10 @@ BACKGROUND_EXPANSIONS, BACKGROUND_EXPANSIONS_OF_POLYGON = 1024, 128
 WITHOUT_PATH = 16
 #: Number of rounds of smoothing for the first path.
 ROUNDS = 3
-#: Maximum cost of a path that is ready after the first round, relative to the way around the obstacles, and its maximum number of
-#: curves: a longer one may lead the wrong way round, and one with more curves gains by the next rounds.
-EARLY_COST, EARLY_CURVES = 1.15, 12
+#: Maximum length of a path that is ready after the first round, relative to the way around the obstacles; maximum cost where that
+#: is another, of which the way around tells less; and maximum number of its curves. A longer one may lead the wrong way round,
+#: and one with more curves gains by the next rounds.
+EARLY_LENGTH, EARLY_COST, EARLY_CURVES = 1.15, 1.3, 12
 #: Time for which results from the background are waited for before the time is looked at [s].
 WAIT = 0.002
 #: Time that must be left for a bound to be computed here where the background has not begun it yet [s].
@@ -109,9 +110,8 @@ class Search:
         self._deadline = deadline or Deadline(math.inf, never)
         self._informed: Informed | None = None
         if settings.informed and to_goal:
-            length_to_goal = to_goal if self.objective.is_length else CostToGo.to_goal(problem, field)
-            self._informed = Informed(HybridAStarRuns(problem, settings, field, to_goal, length_to_goal),
-                                      CostBounds(problem, field, to_goal, length_to_goal, self.objective))
+            self._informed = Informed(HybridAStarRuns(problem, settings, field, to_goal),
+                                      CostBounds(problem, field, to_goal, self.objective))
         self._corridors: Corridors | None = None
         self._sampler = Sampler(problem, settings, field, to_goal)
         self._smoother = Smoother(self.objective, settings.seed, self._deadline.poll)
@@ -269,8 +269,9 @@ class Search:
     def _is_nearly_best(self) -> bool:
         """Return True if the best path is most likely so near to the shortest that it need not wait for what is found next."""
         path, to_goal = self.path, self._informed.bounds.to_goal if self._informed else None
+        factor = EARLY_LENGTH if self.objective.is_length else EARLY_COST
         return (path is not None and len(path.words) <= EARLY_CURVES + 1
-                and self.cost <= EARLY_COST * lower_bound(self._problem, to_goal))
+                and self.cost <= factor * lower_bound(self._problem, to_goal))
 
     def _find_better_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
         """Run hybrid A* once more, as far as its run ends soon."""
@@ -290,7 +291,6 @@ class Search:
             bounds = self._informed.bounds
             if self.best < 0:
                 bounds.to_goal.finish()  # hybrid A* goes on in the background of the samples, and asks for it too
-                bounds.length_to_goal.finish()
             bounds.start(from_start=not self._is_rrt)
 
     def _take_block(self, batch: int) -> Generator[bool, None, int]:
