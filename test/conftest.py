@@ -41,6 +41,16 @@ def pytest_configure(config):
         pytest.exit(f"--kernels asks for {wanted} kernels, but the {_kernels()} ones are in use; {remedy}.", returncode=1)
 
 
+def pytest_xdist_auto_num_workers():
+    """How many processes `-n auto` means: more than cores, as many tests wait for a node."""
+    return len(os.sched_getaffinity(0)) * 3 // 2 or 1
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with those that last a minute, so that no process goes on with one when the others are done."""
+    items.sort(key=lambda item: item.get_closest_marker("minute") is None)
+
+
 def pytest_report_header():
     return [f"kernels: {_kernels()}", f"package: {_package()}"]
 

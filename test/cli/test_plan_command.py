@@ -312,8 +312,9 @@ def test_ctrl_c_before_a_path_is_cancelled(hall):
     assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown
 
 
-def test_a_plot_may_be_an_animation_of_the_search(hall, capsys):
+def test_a_plot_may_be_an_animation_of_the_search(hall, capsys, monkeypatch):
     from PIL import Image
+    monkeypatch.setattr("dubins_rrt_ros.planning.pictures.animation.MOST_FRAMES", 12)
     status, out, err = run(hall, *REQUEST, *BUDGET, "--paper", "--plot", "p.gif", capsys=capsys)
     assert (status, err) == (0, "") and "Path of" in out
     assert Image.open("p.gif").n_frames > 10

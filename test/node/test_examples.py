@@ -18,13 +18,12 @@ SOURCE = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = SOURCE / "examples"
 FOLLOWER = SOURCE / "test/support/follower.py"
 
-pytestmark = [pytest.mark.slow]
-
 
 def needs_messages(test):
     """Mark a test of an example that speaks with Nav2."""
     missing = importlib.util.find_spec("nav2_msgs") is None
-    return pytest.mark.messages(pytest.mark.skipif(missing, reason="nav2_msgs is not here; .ci/messages builds it")(test))
+    skips = pytest.mark.skipif(missing, reason="nav2_msgs is not here; .ci/messages builds it")
+    return pytest.mark.slow(pytest.mark.messages(skips(test)))
 
 
 def numbers(*poses):

@@ -14,8 +14,6 @@ from support.yard import GOAL, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, save_map
 
-pytestmark = pytest.mark.slow
-
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = (State.PRIMARY_STATE_UNCONFIGURED, State.PRIMARY_STATE_INACTIVE,
                                              State.PRIMARY_STATE_ACTIVE, State.PRIMARY_STATE_FINALIZED)
 CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP, SHUTDOWN = (
@@ -45,6 +43,7 @@ class Manager:
         return self._client.response(self._get.call_async(GetState.Request())).current_state.id
 
 
+@pytest.mark.slow
 def test_it_is_brought_up_and_taken_down_twice_and_plans_while_it_is_active(planners, map_file):
     manager = Manager(planners, map_file=map_file, **QUICK)
     for _ in range(2):
@@ -87,6 +86,7 @@ def test_a_parameter_file_may_say_that_it_is_managed_by_namespace_and_wildcard(p
     assert manager.change(CONFIGURE) and manager.change(ACTIVATE) and manager.state == ACTIVE
 
 
+@pytest.mark.slow
 @pytest.mark.messages
 @pytest.mark.skipif(importlib.util.find_spec("nav2_msgs") is None, reason="nav2_msgs is not here; .ci/messages builds it")
 def test_goals_of_actions_are_rejected_while_it_is_inactive(planners, map_file):
@@ -104,6 +104,7 @@ def test_goals_of_actions_are_rejected_while_it_is_inactive(planners, map_file):
     assert action.path(GOAL, START)[0] == SUCCEEDED
 
 
+@pytest.mark.slow
 def test_a_signal_ends_it_in_every_state(planners, map_file):
     for transitions in ([], [CONFIGURE], [CONFIGURE, ACTIVATE], [CONFIGURE, CLEANUP], [SHUTDOWN]):
         manager = Manager(planners, map_file=map_file)

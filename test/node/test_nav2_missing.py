@@ -10,7 +10,6 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 WITHOUT = "import sys; sys.modules['nav2_msgs'] = None; from dubins_rrt_ros.node.main import main; sys.exit(main())"
 
 
-@pytest.mark.slow
 def test_without_nav2_msgs_the_log_says_once_what_is_missing(planners):
     process = planners.start(command=[sys.executable, "-c", WITHOUT])
     client = planners.client()

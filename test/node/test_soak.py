@@ -34,6 +34,7 @@ LOG = 5000
 
 
 @pytest.mark.slow
+@pytest.mark.minute
 def test_soak(planners, request, record_property, monkeypatch):
     seconds, seed = request.config.getoption("--soak"), request.config.getoption("--soak-seed")
     seed = int(np.random.SeedSequence().entropy % 2**31) if seed is None else seed
