@@ -32,7 +32,7 @@ def test_a_number_and_a_seed_give_the_same_problem():
 @needs_compiled
 def test_most_tunnels_are_solved_and_none_by_a_longer_path(tmp_path, capsys):
     file = tmp_path / "lines.jsonl"
-    main(["families", "--families", "tunnel,clutter", "--problems", "12", "--out", str(file)])
+    main(["families", "--families", "tunnel,clutter", "--problems", "12", "--time", "3", "--out", str(file)])
     lines = [json.loads(line) for line in file.read_text().splitlines()]
     assert len(lines) == 24
     assert sum(line["solved"] for line in lines) >= 20

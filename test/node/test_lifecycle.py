@@ -105,8 +105,8 @@ def test_goals_of_actions_are_rejected_while_it_is_inactive(planners, map_file):
 
 
 @pytest.mark.slow
-def test_a_signal_ends_it_in_every_state(planners, map_file):
+def test_a_signal_ends_it_in_every_state(installed_planners, map_file):
     for transitions in ([], [CONFIGURE], [CONFIGURE, ACTIVATE], [CONFIGURE, CLEANUP], [SHUTDOWN]):
-        manager = Manager(planners, map_file=map_file)
+        manager = Manager(installed_planners, map_file=map_file)
         assert all(map(manager.change, transitions))
         assert manager.process.end(signal.SIGINT) == 0, manager.process.output
