@@ -29,6 +29,8 @@ COMMANDS = {
     "audit": Command("judge a path, whoever planned it", "dubins_rrt_ros.cli.audit"),
     "bench": Command("measure the planner on a file of problems, and compare", "dubins_rrt_ros.cli.bench.command"),
     "campaign": Command("try to prove the planner wrong with random problems", "dubins_rrt_ros.evaluation.campaign.command"),
+    "certify": Command("plan a path, and prove how short it is", "dubins_rrt_ros.cli.certify"),
+    "check": Command("check such a proof by code that shares nothing with the planner", "dubins_rrt_ros.cli.check"),
     "demo": Command("see the ROS node plan in the maze", "dubins_rrt_ros.cli.demo.command"),
     "families": Command("plan problems that are solvable by construction", "dubins_rrt_ros.evaluation.families.command"),
     "figures": Command("draw the figures of the documentation", "dubins_rrt_ros.evaluation.figures.command"),

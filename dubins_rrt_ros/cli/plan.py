@@ -16,6 +16,7 @@ from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, 
 from dubins_rrt_ros.planning.problem import DoubtfulYaw, Waypoint, checked_waypoint, doubt_about_yaw
 from dubins_rrt_ros.planning.vehicle import overridden
 
+from .common.certificates import add_certificate_flags, write_proof
 from .common.example import ENDS, EXAMPLE, MAP
 from .common.flags import add_option_flags, add_paper_flag, flag, given_options, given_settings
 from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
@@ -52,6 +53,21 @@ def add_arguments(parser: Parser) -> None:
                   "    --footprint '[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]]'"],
         notes=f"{REFERENCE_POINT} The first Ctrl-C ends the search with the best path so far.",
         exit_status="0 a path, 1 none: its error_code and the reason are on standard error, 2 wrong usage, 130 interrupted")
+    required = add_request_arguments(parser)
+    add_json_flag(parser, "the plan, also without a path,")
+    parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x, y, theta, clearance, curvature")
+    parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
+                                                         f"search ({', '.join(ANIMATIONS)})")
+    parser.add_argument("--certificate", metavar="FILE",
+                        help="write the path with a proof of how short it is, as `dubins_rrt certify` does")
+    add_certificate_flags(parser)
+    parser.add_argument("--replay", metavar="FILE", action=_Replay, contained=required,
+                        help="plan the request of a file that --json wrote again, in place of all other options: with "
+                             "its seed and as many samples as it drew, and no time limit, so that the path is the same")
+
+
+def add_request_arguments(parser: Parser) -> list[argparse.Action]:
+    """Give a parser the arguments of a request; return those that are required."""
     required = [add_map_arguments(parser)]
     for name, text in (("--start", "start pose of the vehicle"), ("--goal", "goal pose of the vehicle")):
         required.append(parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), required=True,
@@ -61,23 +77,19 @@ def add_arguments(parser: Parser) -> None:
                              "passed with the heading that makes the whole path shortest")
     parser.add_argument("--degrees", action="store_true", default=argparse.SUPPRESS,
                         help="take the yaws of --start, --via and --goal in degrees; what is written stays in radians")
-    add_json_flag(parser, "the plan, also without a path,")
-    parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x, y, theta, clearance, curvature")
-    parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
-                                                         f"search ({', '.join(ANIMATIONS)})")
-    parser.add_argument("--replay", metavar="FILE", action=_Replay, contained=required,
-                        help="plan the request of a file that --json wrote again, in place of all other options: with "
-                             "its seed and as many samples as it drew, and no time limit, so that the path is the same")
     for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
         add_option_flags(parser, title, cls)
     add_paper_flag(parser)
+    return required
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Plan, report, write the files, and return the exit status."""
-    check_folder(arguments.json, arguments.csv, arguments.plot)
+    check_folder(arguments.json, arguments.csv, arguments.plot, arguments.certificate)
     check_drawing(arguments.plot, DRAWINGS + ANIMATIONS)
     request = _request(arguments)
+    if arguments.certificate and request.waypoints:
+        raise UsageError("a path through waypoints has no certificate; leave --via out")
     watch = _Watch(request.settings, is_animation(arguments.plot))
     with _interrupt() as cancel, watch.shown() as on_progress:
         if request.waypoints:
@@ -89,19 +101,24 @@ def run(arguments: argparse.Namespace) -> int:
     _write(answer, request.map_name, arguments)
     if arguments.plot:
         watch.draw(arguments.plot, answer)
+    if arguments.certificate and answer.path:
+        claim = write_proof(arguments.certificate, answer, request.map_name, arguments.gap, arguments.seconds)
+        print(claim, file=words_for(arguments.json))
     return 0 if answer.path else 1
 
 
 def _request(arguments: argparse.Namespace) -> LoadedRequest:
     if arguments.replay is None:
-        return _new_request(arguments)
-    others = vars(arguments).keys() - {"command", "run", "json", "csv", "plot", "replay", *MAP_FLAGS}
+        return new_request(arguments)
+    written = {"json", "csv", "plot", "certificate", "gap", "seconds"}
+    others = vars(arguments).keys() - {"command", "run", "replay", *written, *MAP_FLAGS}
     if others:
         raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(others))}")
     return read_replay(arguments.replay, **map_options(arguments))
 
 
-def _new_request(arguments: argparse.Namespace) -> LoadedRequest:
+def new_request(arguments: argparse.Namespace) -> LoadedRequest:
+    """Read the request that the flags of `add_request_arguments` describe."""
     warnings.simplefilter("ignore", DoubtfulYaw)  # which `_pose` says, with the flag
     given = given_options(arguments, Vehicle)
     for name, by in overridden(given).items():

@@ -16,7 +16,8 @@ from dubins_rrt_ros.cli import main as program
 from dubins_rrt_ros.cli.commands import make_parser
 from dubins_rrt_ros.cli.common.parser import guard_numbers
 
-COMMANDS = ["plan", "audit", "bench", "campaign", "completion", "demo", "figures", "paper", "play", "render", "watch"]
+COMMANDS = ["plan", "audit", "bench", "campaign", "certify", "check", "completion", "demo", "figures", "paper", "play", "render",
+            "watch"]
 ENDS = ["--start", "1.5", "2", "1.57", "--goal", "13.5", "10.5", "1.57"]
 
 

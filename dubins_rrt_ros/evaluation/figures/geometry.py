@@ -222,6 +222,7 @@ def _draw_shape(axes: Axes, corners: ArrayLike, colour: str) -> None:
     axes.add_patch(Polygon(corners, facecolor=to_rgba(colour, 0.2), edgecolor=colour, linewidth=1.8, zorder=3))
 
 
+<<<<<<< HEAD
 def reference_point() -> Figure:
     """Draw a car that turns left as tightly as it can, with its reference point and what is measured from there."""
     figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
@@ -259,3 +260,39 @@ def _draw_wheel(axes: Axes, x: float, y: float, angle: float) -> None:
 
 FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (
     six_words, collision_walk, footprint_cover, reference_point)}
+=======
+def proof_curve() -> Figure:
+    """Draw a turn, a straight line and a turn with the vectors of the proof of its length."""
+    curve = shortest((0.0, 0.0, math.radians(100)), (6.0, 0.6, math.radians(-70)), 1.0)
+    poses = curve.poses(SPACING / 4)
+    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set(aspect="equal")
+    axes.axis("off")
+    side = [SIDES[letter] for letter in (curve.word[0], curve.word[2])]
+    centres = [(x - turn * math.sin(theta), y + turn * math.cos(theta))
+               for turn, (x, y, theta) in zip(side, (curve.start, curve.end), strict=True)]
+    for centre in centres:
+        axes.add_patch(Circle(centre, 1.0, fill=False, linestyle=":", edgecolor=OBSTACLE))
+    axes.plot(poses[:, 0], poses[:, 1], color=PATH, linewidth=2.6)
+    phi = curve.pose_at(curve.lengths[0])[2]
+    x, y, _ = curve.pose_at(curve.lengths[0] + curve.lengths[1] / 2)
+    for angle, name, colour in ((phi, "e(\u03c6)", PATH), (phi - 0.35, "e(\u03c8)", FAILURE)):
+        _arrow(axes, (x, y), (x + 1.2 * math.cos(angle), y + 1.2 * math.sin(angle)), name, colour)
+    _arrow(axes, centres[0], centres[1], "V", GOAL)
+    for name, (px, py, _) in (("p", curve.start), ("q", curve.end)):
+        axes.plot(px, py, "o", color=START)
+        axes.annotate(name, (px, py), xytext=(-14, -4), textcoords="offset points", fontsize=LABEL)
+    axes.autoscale_view()
+    return figure
+
+
+def _arrow(axes: Axes, tail: tuple[float, float], head: tuple[float, float], name: str, colour: str) -> None:
+    axes.annotate("", head, xytext=tail, arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 1.8})
+    axes.annotate(name, ((tail[0] + 2 * head[0]) / 3, (tail[1] + 2 * head[1]) / 3), xytext=(4, 6), textcoords="offset points",
+                  color=colour, fontsize=LABEL)
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (
+    six_words, collision_walk, footprint_cover, proof_curve)}
+>>>>>>> c263d95 (Certificates: certify writes a path with the proof of its length, check judges it by code of its own)

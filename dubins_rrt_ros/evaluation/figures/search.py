@@ -43,6 +43,8 @@ SEED = 5
 SPACING, PIECE, PIXEL, STEP = 0.2, 0.1, 0.05, 0.1
 #: Sides of a picture of the maze, of one with a colour bar, of two pictures, and of the convergence plot [inch].
 PICTURE, COLOURED, PICTURES, CURVES = (6.6, 5.8), (6.6, 5.3), (9.6, 4.3), (7.2, 4.4)
+#: Number of levels that are drawn.
+LEVELS = 7
 #: Font sizes.
 TITLE, NOTE = 13, 11
 #: Substitute for infinity where contours are drawn, which take none [m].
@@ -134,6 +136,31 @@ def bounds() -> Figure:
     return figure
 
 
+def proof() -> Figure:
+    """Draw levels of the cost from the start, and where the best path leaves each for the last time."""
+    _, final = first_and_final()
+    problem, known = final.problem, bounds_of(final.problem)
+    poses = path_of(final).poses(SPACING / 4)
+    costs = known.from_start.at(poses[:, :2])
+    levels = np.linspace(0, costs[-1], LEVELS + 2)[1:-1]
+    figure, axes = _picture(PICTURE, "Levels of the cost from the start",
+                            "the path is at least as long as the Dubins curves between them")
+    draw_map(axes, problem.map)
+    points = _grid(problem, STEP)
+    over = known.from_start.at(points.reshape(-1, 2)).reshape(points.shape[:2])
+    over[np.isinf(over)] = np.nan
+    axes.contour(points[..., 0], points[..., 1], over, levels=levels, colors=GOAL, linewidths=1.6, zorder=3)
+    axes.plot(poses[:, 0], poses[:, 1], color=PATH, linewidth=2.4, zorder=4)
+    last = [np.flatnonzero(costs <= level)[-1] for level in levels]
+    axes.plot(poses[last, 0], poses[last, 1], "o", color=FAILURE, markersize=7, zorder=5)
+    draw_poses(axes, problem.start, problem.goal, problem.vehicle)
+    figure.legend(handles=[
+        Line2D([], [], color=GOAL, linewidth=1.6, label="levels"), Line2D([], [], color=PATH, linewidth=2.4, label="path"),
+        Line2D([], [], color=FAILURE, marker="o", linestyle="none", label="crossings"),
+    ], loc="outside lower center", ncols=3, fontsize=NOTE, frameon=False)
+    return figure
+
+
 def convergence() -> Figure:
     """Draw the excess of paths over the lower bound, over samples."""
     problem = problem_in(MAZE)
@@ -157,7 +184,7 @@ def convergence() -> Figure:
 
 #: Functions that draw the figures, by the names of their files without the ending.
 FIGURES: dict[str, Callable[[], Figure]] = {
-    drawn.__name__: drawn for drawn in (rrt_and_rrt_star, informed_search, bounds, convergence)}
+    drawn.__name__: drawn for drawn in (rrt_and_rrt_star, informed_search, bounds, proof, convergence)}
 
 
 def first_and_final() -> tuple[Plan, Plan]:

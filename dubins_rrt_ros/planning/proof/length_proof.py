@@ -79,6 +79,16 @@ class LengthProof:
             if interrupted() or not self._add_levels_along_string():
                 break
 
+    @property
+    def levels(self) -> np.ndarray:
+        """Levels whose crossings the proof looks at, ascending [m]."""
+        return np.array([layer.level for layer in self._layers[1:-1]])
+
+    @property
+    def sets(self) -> LevelSets:
+        """The costs whose levels they are."""
+        return self._sets
+
     def run(self, interrupted: Callable[[], bool], gap: float = 0.0) -> None:
         """Raise the bound, until the path is at most `gap` above it, or there is no more to gain.
 

@@ -69,6 +69,31 @@ class LevelSets:
         near = np.hypot(columns + 0.5 - column, rows + 0.5 - row) <= tolerance / side + 1
         return max(0.0, float(self._least[rows[near], columns[near]].min(initial=UNLIMITED)))
 
+    @property
+    def from_start(self) -> np.ndarray:
+        """Costs from the start at the nodes [m], `UNLIMITED` where there is no way."""
+        return np.asarray(self._costs)
+
+    @property
+    def to_goal(self) -> np.ndarray:
+        """Costs to the goal at the nodes [m]."""
+        return np.asarray(self._to_goal.kernel.nodes())
+
+    @property
+    def is_free(self) -> np.ndarray:
+        """The squares between the nodes that may hold a free place; the first node is one square before the raster."""
+        return np.asarray(self._is_free)
+
+    @property
+    def side(self) -> float:
+        """Side of a square [m]."""
+        return float(self._from_start.kernel.side)
+
+    @property
+    def cells(self) -> int:
+        """Number of the raster's cells along the side of a square."""
+        return round(self.side / float(self._field.kernel.resolution))
+
     def costs(self, points: np.ndarray) -> np.ndarray:
         """Return the (n,) costs from the start at (n, 2) points [m]; infinite where there is no way."""
         return self._from_start.at(points)

@@ -1,0 +1,193 @@
+"""Make a certificate: the path, and the proof that no path is much shorter."""
+
+import gzip
+import json
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...checker.bounds import too_high
+from ...checker.check import MARGIN, goal_boxes, inner_radius, pose_box, used_portals
+from ...checker.levels import Squares
+from ...checker.maps import UnreadableMap, digest_of_cells, read_map
+from ...checker.maps import World as CheckedMap
+from .._kernels import UNLIMITED
+from ..collision.clearance import ClearanceField
+from ..curves.path import Path
+from ..errors import PlanningError
+from ..maps.model import GridMap
+from ..problem import Problem
+from ..proof.length_proof import GAPS, LengthProof
+from .bisection import Bisection
+from .cells import Cells
+from .cover import Cover, Ends
+from .potentials import Potentials
+
+#: Share by which more than the length is proved at first, for what the margins of potentials take.
+SLACK = 1e-8
+
+
+class CertificateError(PlanningError, ValueError):
+    """A request whose path cannot be certified; the message says why."""
+
+
+def certify(problem: Problem, path: Path, map_path: str | File, gap: float, seconds: float,
+            field: ClearanceField | None = None) -> dict[str, Any]:
+    """Return the certificate of a path.
+
+    Args:
+        problem: what the path solves; its map is that of the file.
+        map_path: a map_server YAML file, or polygons.
+        gap: share by which the path may be longer than the shortest, down to which the bound is to be raised.
+        seconds: approximate time for it.
+        field: the clearance of the map, where it is at hand.
+
+    Raises:
+        CertificateError: the map is not as the checker reads it, or the request is of a kind that has no certificates.
+    """
+    if problem.start_slack > 0:
+        raise CertificateError("a start that is nearer to an obstacle than allowed has no certificate; leave start_slack out")
+    until = time.perf_counter() + seconds
+    world = _checked_map(problem, map_path)
+    document = _claim(problem, path, world)
+    if inner_radius(document["request"]) > 0:
+        proof = LengthProof(problem, field or ClearanceField(problem.map, problem.allow_unknown), path)
+        proof.run(lambda: time.perf_counter() > until - seconds * 0.8, gap)
+        return document | _Draft(document, world, proof).proved(gap, lambda: time.perf_counter() > until)
+    return document | _without_obstacles(document, world)
+
+
+def _checked_map(problem: Problem, map_path: str | File) -> CheckedMap:
+    """Return the map as the checker reads it."""
+    try:
+        world = read_map(map_path, problem.allow_unknown)
+    except UnreadableMap as error:
+        raise CertificateError(f"the checker cannot read the map: {error}") from None
+    grid = problem.map
+    if isinstance(grid, GridMap):
+        same = world.description.get("sha256") == digest_of_cells(grid.data) and world.description["origin"] == list(grid.origin)
+    else:
+        same = world.free is not None and bool(shapely.equals(world.free, grid.free))
+    if not same:
+        raise CertificateError(f"the checker reads {map_path} otherwise than it was planned on; a picture needs its YAML file, "
+                               "without unknown_grey")
+    return world
+
+
+def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str, Any]:
+    """Return the proof by the Dubins curves alone, where the vehicle covers no disc around its reference point."""
+    request, length = document["request"], document["length"]
+    start, goal = (world.own(request[name]) for name in ("start", "goal"))
+    goals = goal_boxes(goal, request["goal_tolerance_xy"], request["goal_tolerance_yaw"], length)
+    margin = 2 * MARGIN * (length + world.size)
+    box = pose_box(*start, 0.0, 0.0, 0.0, math.nan)
+    bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
+    return {"bound": bound, "gap": length / bound - 1 + 1e-12, "limit": length, "levels": [], "cells": [], "boxes": [],
+            "squares": {"corner": [0, 0], "side": 1, "parts": 1, "free": []}, "from_start": [], "to_goal": []}
+
+
+def _claim(problem: Problem, path: Path, world: CheckedMap) -> dict[str, Any]:
+    """Return what a certificate says of map, request and path."""
+    vehicle = problem.vehicle
+    return {
+        "certificate": 1, "map": world.description | {"allow_unknown": problem.allow_unknown},
+        "request": {"start": list(problem.start), "goal": list(problem.goal), "goal_tolerance_xy": problem.goal_tolerance_xy,
+                    "goal_tolerance_yaw": problem.yaw_tolerance, "turning_radius": vehicle.turning_radius,
+                    "robot_radius": vehicle.robot_radius, "footprint": [list(corner) for corner in vehicle.footprint]},
+        "path": [[letter, curve.radius, length] for curve in path.curves
+                 for letter, length in zip(curve.word, curve.lengths, strict=True) if length > 0],
+        "length": path.length}
+
+
+class _Draft:
+    """The proof of a certificate that is being made."""
+
+    def __init__(self, document: dict[str, Any], world: CheckedMap, proof: LengthProof):
+        self._world, self._request, self._length = world, document["request"], float(document["length"])
+        self._inner = inner_radius(document["request"])
+        sets = proof.sets
+        side = sets.side
+        free = sets.is_free & _full(sets.from_start) & _full(sets.to_goal)
+        from_start, to_goal = (np.where(_touched(free), nodes, np.nan) for nodes in (sets.from_start, sets.to_goal))
+        levels = proof.levels
+        while np.isin(levels, from_start).any():
+            levels = np.where(np.isin(levels, from_start), np.nextafter(levels, 0), levels)
+        self._squares = Squares((-side, -side), side, from_start, levels)
+        self._to_goal = Squares((-side, -side), side, to_goal, levels[:0])
+        self._free, self._parts = free, 2 * sets.cells
+        domain = np.flatnonzero(free)
+        least = sum(squares.corners(domain).min(axis=(1, 2)) for squares in (self._squares, self._to_goal))
+        self._limit = self._length * (1 + 1e-6) + 2 * side
+        self._corridor = domain[least < self._limit]
+        self._cells = Cells(self._squares, self._corridor)
+
+    def proved(self, gap: float, is_over: Callable[[], bool]) -> dict[str, Any]:
+        """Return the fields of the proof, with a bound for which the path is at most `gap` above, if there is time for it."""
+        cover, radius = self._cover(), float(self._request["turning_radius"])
+        bisection = Bisection(cover, radius)
+        for share in (*(share for share in GAPS if share > gap), gap):
+            bisection.run(self._length / (1 + share) * (1 + SLACK), is_over)
+        bound = Potentials(cover, radius, bisection.bound).bound
+        names = np.column_stack([part[cover.index] for part in cover.pieces[:3]]).tolist()
+        values = np.where(cover.is_free, cover.potentials, np.nan)
+        return {
+            "bound": bound, "gap": self._length / bound - 1 + 1e-12, "limit": self._limit,
+            "squares": {"corner": list(self._squares.corner), "side": self._squares.side, "parts": self._parts,
+                        "free": ["".join("01"[is_free] for is_free in row) for row in self._free.tolist()]},
+            "from_start": _rows(self._squares.costs), "to_goal": _rows(self._to_goal.costs),
+            "levels": self._squares.levels.tolist(), "cells": self._cells.of_squares(),
+            "boxes": [[*name, way, *shares, *value] for name, way, shares, value
+                      in zip(names, cover.way.tolist(), cover.shares.tolist(), _rows(values[:, None]), strict=True)]}
+
+    def _cover(self) -> Cover:
+        pieces = self._squares.pieces(self._corridor)
+        below, above = (self._cells.at(pieces.square, pieces.level + i).tolist() for i in (0, 1))
+        keys = list(zip(below, above, strict=True)), list(zip(above, below, strict=True))
+        ends = self._ends()
+        limits = np.column_stack([self._squares.levels[pieces.level], self._to_goal.corners(pieces.square).min(axis=(1, 2))])
+        return Cover(pieces, keys, used_portals({*keys[0], *keys[1]}, ends.start_cell, ends.goal_cells), ends, limits,
+                     self._is_blocked, MARGIN * (self._limit + self._world.size))
+
+    def _ends(self) -> Ends:
+        start, goal = (self._world.own(self._request[name]) for name in ("start", "goal"))
+        square, cost = self._squares.at(*start[:2])
+        start_cell = int(self._cells.at(square, self._squares.slabs(cost)))
+        tolerance = self._request["goal_tolerance_xy"]
+        goals = goal_boxes(goal, tolerance, self._request["goal_tolerance_yaw"], 0.0)
+        if tolerance == 0:
+            square, goals[:, 9] = self._squares.at(*goal[:2])
+            cells, excess = {int(self._cells.at(square, self._squares.slabs(goals[0, 9])))}, self._to_goal.at(*goal[:2])[1]
+        else:
+            near = self._squares.within(self._corridor, *goal[:2], tolerance + 1e-6)
+            cells, excess = self._cells.of(near), float(self._to_goal.corners(near).max())
+        return Ends(pose_box(*start, 0.0, 0.0, 0.0, cost), goals, start_cell, cells, max(0.0, excess))
+
+    def _is_blocked(self, boxes: np.ndarray) -> np.ndarray:
+        return self._world.clearances(boxes[:, :2], self._inner) + boxes[:, 4] * (1 + 1e-9) + 1e-9 < self._inner
+
+
+def write_certificate(file: str | File, document: dict[str, Any]) -> None:
+    """Write a certificate, compressed."""
+    File(file).write_bytes(gzip.compress(json.dumps(document).encode()))
+
+
+def _full(nodes: np.ndarray) -> np.ndarray:
+    """Return the squares that have costs at all their corners."""
+    has = nodes < UNLIMITED
+    return np.asarray(has[:-1, :-1] & has[1:, :-1] & has[:-1, 1:] & has[1:, 1:])
+
+
+def _touched(squares: np.ndarray) -> np.ndarray:
+    """Return the nodes that are corners of squares."""
+    around = np.pad(squares, 1)
+    return np.asarray(around[:-1, :-1] | around[1:, :-1] | around[:-1, 1:] | around[1:, 1:])
+
+
+def _rows(values: np.ndarray) -> list[list[float | None]]:
+    """Return the numbers of an array, with None for what is none."""
+    return [[None if number != number else number for number in row] for row in values.tolist()]
