@@ -222,7 +222,6 @@ def _draw_shape(axes: Axes, corners: ArrayLike, colour: str) -> None:
     axes.add_patch(Polygon(corners, facecolor=to_rgba(colour, 0.2), edgecolor=colour, linewidth=1.8, zorder=3))
 
 
-<<<<<<< HEAD
 def reference_point() -> Figure:
     """Draw a car that turns left as tightly as it can, with its reference point and what is measured from there."""
     figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
@@ -258,9 +257,6 @@ def _draw_wheel(axes: Axes, x: float, y: float, angle: float) -> None:
     axes.add_patch(Polygon(corners @ turn + (x, y), color=OBSTACLE, zorder=4))
 
 
-FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (
-    six_words, collision_walk, footprint_cover, reference_point)}
-=======
 def proof_curve() -> Figure:
     """Draw a turn, a straight line and a turn with the vectors of the proof of its length."""
     curve = shortest((0.0, 0.0, math.radians(100)), (6.0, 0.6, math.radians(-70)), 1.0)
@@ -294,5 +290,4 @@ def _arrow(axes: Axes, tail: tuple[float, float], head: tuple[float, float], nam
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {figure.__name__: figure for figure in (
-    six_words, collision_walk, footprint_cover, proof_curve)}
->>>>>>> c263d95 (Certificates: certify writes a path with the proof of its length, check judges it by code of its own)
+    six_words, collision_walk, footprint_cover, reference_point, proof_curve)}
