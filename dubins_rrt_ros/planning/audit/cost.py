@@ -47,7 +47,7 @@ def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: 
         return cost
     arcs = driven_arcs(path.curves, path.start)[2]
     if preferred_clearance > 0 and weight > 0:
-        cost += weight * _crowding(arcs, problem, preferred_clearance, obstacles, check_time)
+        cost += weight * _closeness(arcs, problem, preferred_clearance, obstacles, check_time)
     if cell_weight > 0 and isinstance(problem.map, GridMap) and problem.map.costs is not None:
         cost += cell_weight * _over_cells(arcs, problem.map, check_time)
     return cost
@@ -61,7 +61,7 @@ def roomy_share_of(path: "Path", problem: Problem, preferred_clearance: float, o
                for size, room in _rooms(arcs, problem, preferred_clearance, obstacles, check_time)) / path.length
 
 
-def _crowding(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None,
+def _closeness(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None,
               check_time: Callable[[], None]) -> float:
     """Return the integral of max(0, 1 - room / preferred_clearance)^2 [m]."""
     return sum(float((size * np.maximum(0, 1 - room / preferred_clearance)**2).sum())
