@@ -89,6 +89,15 @@ def test_a_line_tells_what_plan_does(capsys):
     assert f" ms, {min(line['final_cost'] for line in lines[:2]):.2f} m\n" in said
 
 
+def test_a_problem_without_a_path_is_told_with_its_reason_once(capsys):
+    file = problems(entry(), entry(name="beside", goal=[99.0, 0.0, 0.0]))
+    lines = bench(file, "--seeds", "2", *BUDGET, status=1)
+    said = capsys.readouterr().out.splitlines()
+    assert said[1].startswith("beside: 0/2 solved, ")
+    assert said[2:] == [f"  {lines[2]['error_name']}: {lines[2]['message']}"]
+    assert said[2].startswith("  GOAL_OUTSIDE_MAP: ") and "99" in said[2]
+
+
 @pytest.mark.slow
 def test_any_number_of_processes_plans_the_same():
     file = problems(entry(), entry(name="back", start=[*GOAL[:2], 1.57], goal=[*START[:2], -1.57]))
