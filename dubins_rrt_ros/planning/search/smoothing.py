@@ -14,8 +14,9 @@ from ..vehicle import Vehicle
 from .cost import Objective
 from .pace import Pace
 
-#: Number of changes that are tried in one round, and where the cost is not the length, which takes several times as long.
-TRIES, COSTLY_TRIES = 512, 256
+#: Number of changes that are tried in one round; and where the cost is not the length, which takes several times as long, in the
+#: first round and in later ones.
+TRIES, FIRST_COSTLY_TRIES, COSTLY_TRIES = 512, 128, 256
 #: Number of changes in the first slice of a round, after which the time is looked at.
 FIRST_SLICE = 4
 #: Share of shortcuts, which are coarse, among the changes: in the first round, and in later ones.
@@ -39,7 +40,8 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
         price: what a curve more may save [m]; without effect where the cost is the length.
     """
     edge_cost = (objective or Objective(vehicle, field)).edge_cost()
-    tries = TRIES if edge_cost.is_length else SIMPLIFYING_TRIES if price > 0 else COSTLY_TRIES
+    costly = SIMPLIFYING_TRIES if price > 0 else FIRST_COSTLY_TRIES if first_round else COSTLY_TRIES
+    tries = TRIES if edge_cost.is_length else costly
     draws = np.column_stack([rng.random((tries, 4)), rng.normal(size=(tries, 2))])
     shortcutter = Shortcutter(checker=field.collision_checker(vehicle), edge_cost=edge_cost, radius=path.radius,
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
