@@ -29,6 +29,7 @@ from dubins_rrt_ros.planning import (
     prepare,
     values,
 )
+from dubins_rrt_ros.planning.audit.cost import COST_ERROR, cost_of
 from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_gap
 from dubins_rrt_ros.planning.audit.sweep import pose_gaps
 from dubins_rrt_ros.planning.curves.dubins import shortest
@@ -109,12 +110,26 @@ def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         yield f"it took {answer.planning_time:.3g} s, the limit being {settings.planning_time:g} s"
     if answer.path is not None:
         yield from (f"the path: {finding}" for finding in audit_path(answer.path, problem).findings)
+        yield from _check_cost(answer)
         if trial.fits is False:
             yield "it found a path where there is none"
     elif answer.status in (Status.NO_VALID_PATH, Status.TIMEOUT):
         yield from _check_failure(trial, answer)
     elif answer.status not in _REFUSALS:
         yield f"{answer.status.name}: {answer.message}"
+
+
+def _check_cost(answer: Plan) -> Iterator[str]:
+    """Yield what is wrong with the cost of the path, which is measured anew where it is more than the length."""
+    settings, problem = answer.settings, answer.problem
+    preferred = settings.preferred_clearance_of(problem.vehicle)
+    if answer.path is None or answer.cost is None or preferred == 0:
+        return
+    cost = cost_of(answer.path, problem, preferred, settings.clearance_weight, settings.weight_of_cells)
+    if abs(answer.cost - cost) > COST_ERROR * cost:
+        yield f"the cost of the path is {answer.cost:.6g} m, and by the audit {cost:.6g} m"
+    if answer.cost_lower_bound > (1 + COST_ERROR) * cost:
+        yield f"the cost of the path is {cost:.6g} m, less than the bound {answer.cost_lower_bound:.6g} m"
 
 
 def _check_invariants(answer: Plan) -> Iterator[str]:

@@ -71,7 +71,10 @@ def random_settings(rng: np.random.Generator, scale: float) -> Settings:
         step_size=scale * log_uniform(rng, 0.3, 10.0) if rng.random() < 0.4 else 0.0,
         goal_bias=float(rng.choice([0.0, 0.05, 0.3, 1.0], p=[0.1, 0.5, 0.3, 0.1])),
         heading_sampling=str(rng.choice(["uniform", "goal", "field", "mixed"])),
-        informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6))
+        informed=bool(rng.random() < 0.6), shortcut=bool(rng.random() < 0.6),
+        # Drawn last, so that all else is as it was before there were costs.
+        preferred_clearance=float(rng.choice([0.0, -1.0, scale * log_uniform(rng, 0.02, 0.5)], p=[0.5, 0.25, 0.25])),
+        clearance_weight=log_uniform(rng, 0.2, 10.0))
 
 
 def _on_map(make: Callable[[np.random.Generator], Map]) -> Callable[[np.random.Generator], Trial]:
