@@ -4,7 +4,9 @@ Every path crosses the levels of the cost from the start in order (`level_sets.p
 chain of boxes, one on each level, whose costs are lower bounds of the Dubins curves from box to box without any obstacles
 (`_kernels/interval_curves.py`). Branch and bound: boxes on chains that are cheap are halved, and where the cheapest chain leads
 through an obstacle a level is added. Chains that cost at least the length that is being proved are left out, so that the bound
-holds for all paths, whichever way round they lead. To split boxes of places and headings is the idea of G* (docs/bounds.md).
+holds for all paths, whichever way round they lead. A chain may leave a box from another pose than it came to, and over many near
+levels that adds up; so it costs at least what one without some of the levels does, too. To split boxes of places and headings is
+the idea of G* (docs/bounds.md).
 """
 
 import math
@@ -41,6 +43,8 @@ SPLIT_SHARE = 0.6
 #: Maximum number of times that levels are added at first, where the shortest string over the levels leads into obstacles; their
 #: least distance from others in turning radii; and depth in shares of the required clearance.
 STRING_ROUNDS, STRING_SPACING, STRING_DEPTH = 20, 1.0, 1.0
+#: Numbers of layers back, or to the first one, from where chains are bounded without the boxes between.
+STEPS = 2, 4, 1_000_000
 #: Number of pairs of boxes after which `interrupted` is asked.
 PAIRS = 4096
 #: Maximum number of boxes.
@@ -187,16 +191,34 @@ class LengthProof:
         """Compute the costs of chains up to each open box, or from there on, where they are not those of the last round."""
         layers = self._layers[::-1] if backwards else self._layers
         changed = np.zeros(1, bool)
-        for source, layer in pairwise(layers):
+        for index, layer in enumerate(layers[1:], start=1):
+            source = layers[index - 1]
             links = layer.after if backwards else layer.before
             due = layer.is_open & (self._is_stale | (links < 0) | changed[links] | ~source.is_open[links])
-            changed = self._relax(source, layer, np.flatnonzero(due), limit, backwards)
+            earlier = [layers[other] for other in sorted({max(0, index - step) for step in STEPS}) if other < index - 1]
+            changed = self._relax(source, earlier, layer, np.flatnonzero(due), limit, backwards)
 
-    def _relax(self, source: Layer, layer: Layer, due: np.ndarray, limit: float, backwards: bool) -> np.ndarray:
-        """Compute the costs of chains to the boxes `due` of a layer; return (n,) bool, True where they changed."""
+    def _relax(self, source: Layer, earlier: list[Layer], layer: Layer, due: np.ndarray, limit: float, backwards: bool
+               ) -> np.ndarray:
+        """Compute the costs of chains to the boxes `due` of a layer; return (n,) bool, True where they changed.
+
+        They cost at least what they do without the boxes between an `earlier` layer and this one: the most of these counts.
+        """
         changed = np.zeros(len(layer), bool)
-        known, left = (source.on, layer.up_to) if backwards else (source.up_to, layer.on)
         costs, links = (layer.on, layer.after) if backwards else (layer.up_to, layer.before)
+        found, best = self._least_costs(source, layer, due, limit, backwards)
+        for other in earlier:
+            below = np.flatnonzero(found < UNLIMITED)
+            found[below] = np.maximum(found[below], self._least_costs(other, layer, due[below], limit, backwards)[0])
+        changed[due] = found != costs[due]
+        costs[due] = found
+        links[due] = best
+        return changed
+
+    def _least_costs(self, source: Layer, layer: Layer, due: np.ndarray, limit: float, backwards: bool
+                     ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the least costs of chains from boxes of a layer to the boxes `due` of another one, and these boxes or -1."""
+        known, left = (source.on, layer.up_to) if backwards else (source.up_to, layer.on)
         usable = np.flatnonzero(source.is_open & (known < UNLIMITED))
         usable = usable[np.argsort(known[usable], kind="stable")]
         found, best = np.full(len(due), UNLIMITED), np.full(len(due), -1, np.int32)
@@ -207,11 +229,7 @@ class LengthProof:
             some = slice(begin, begin + size)
             relax(known[usable], source.boxes[usable], layer.boxes[due[some]], left[due[some]], self._radius, limit, backwards,
                   found[some], best[some])
-        changed[due] = found != costs[due]
-        costs[due] = found
-        links[due] = usable[best] if len(usable) else -1
-        links[due[best < 0]] = -1
-        return changed
+        return found, np.where(best >= 0, usable[best] if len(usable) else -1, -1)
 
     def _split(self, up_to: float, limit: float) -> bool:
         """Halve the open boxes on chains that cost less than `up_to`; False if there are none."""

@@ -16,7 +16,7 @@ class CostToGo:
 
     After `make_bound` they are lower bounds, as `_kernels/cost_to_go.py` proves; before, they can be too high by a few percent.
 
-    Lengths are about one percent below the shortest ways, and a little more where ways bend, since a square is taken as free
+    Lengths are 0.5 to 6 percent below the shortest ways, the more the more often these bend, since a square is taken as free
     where a point of it may be. On maps so large that a square is wider than the vehicle, thin walls may have holes.
 
     Attributes:
