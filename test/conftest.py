@@ -41,6 +41,7 @@ def pytest_configure(config):
         pytest.exit(f"--kernels asks for {wanted} kernels, but the {_kernels()} ones are in use; {remedy}.", returncode=1)
 
 
+@pytest.hookimpl(optionalhook=True)  # without pytest-xdist the suite still runs
 def pytest_xdist_auto_num_workers():
     """How many processes `-n auto` means: more than cores, as many tests wait for a node."""
     return len(os.sched_getaffinity(0)) * 3 // 2 or 1
