@@ -23,7 +23,7 @@ FIRST_SLICE = 4
 FIRST_SHORTCUTS, LATER_SHORTCUTS = 0.8, 0.3
 #: Price of a curve of a path that is published, in turning radii; number of changes that are tried in a round that simplifies it,
 #: and maximum number of rounds: one that saves less than a curve is the last.
-PRICE, SIMPLIFYING_TRIES, SIMPLIFICATIONS = 0.005, 128, 12
+PRICE, SIMPLIFYING_TRIES, SIMPLIFICATIONS = 0.01, 128, 12
 #: Minimum gain of a round, relative to the cost, that makes another one worthwhile.
 WORTHWHILE_GAIN = 1e-4
 
