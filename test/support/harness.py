@@ -13,7 +13,8 @@ import numpy as np
 
 from support.forked import ForkedPlanner
 
-DEADLINE = 20.0
+#: Maximum time until something happens that a test waits for, on a machine that is busy [s].
+DEADLINE = 60.0
 
 
 class NodeProcess:
