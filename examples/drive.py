@@ -41,6 +41,8 @@ LOOKAHEAD, NOISE_XY, NOISE_YAW = 0.5, 0.01, 0.01
 STEP, POSE_PERIOD, MAP_PERIOD = 0.02, 0.05, 0.5
 #: Of people: their number, radius [m], speed [m/s], how near to a car they turn back, and how far a car sees them [m].
 PEOPLE, PERSON, WALK, SHY, SIGHT = 3, 0.2, 0.6, 1.2, 6.0
+#: Number of poses of the path that a driver looks ahead, and where a car has the right of way.
+LOOK, LOOK_FOR_CARS = 25, 60
 #: Number of wrong cells in each map.
 SPECKLE = 2
 #: Maximum number of places that are tried for a goal.
@@ -115,7 +117,7 @@ class Car:
     """A car with a planner of its own, in a namespace of its own."""
 
     def __init__(self, number: int, floor: Floor, executor: SingleThreadedExecutor, rng: np.random.Generator):
-        self._floor, self._rng = floor, rng
+        self._number, self._floor, self._rng = number, floor, rng
         self.namespace = f"/car{number}"
         rules = [part for name, value in PARAMETERS.items() for part in ("-p", f"{name}:={json.dumps(value)}")]
         self.planner = subprocess.Popen([*planner_command(), "--ros-args", "-r", f"__ns:={self.namespace}", *rules],
@@ -245,10 +247,20 @@ class Car:
         return max(-MOST_CURVATURE, min(MOST_CURVATURE, curvature))
 
     def _is_braking(self, others: list[np.ndarray]) -> bool:
-        """Return True if somebody is on the next metre of the path, as any driver sees."""
-        ahead = self._plan[self._at:self._at + 25, :2]
-        close = np.array([*self._floor.people[:, :2], *(other[:2] for other in others)])
-        return len(ahead) > 0 and bool((np.hypot(*(ahead[:, None] - close).T) < BODY + PERSON + 0.05).any())
+        """Return True if the next metre of the path leads nearer to somebody who is near, as any driver sees.
+
+        A car waits sooner for those before it: of two that meet one has to leave room for the other, as neither can back up.
+        """
+        with_way, places = others[:self._number - 1], [*self._floor.people[:, :2], *(other[:2] for other in others)]
+        return self._leads_nearer(places, LOOK) or self._leads_nearer([other[:2] for other in with_way], LOOK_FOR_CARS)
+
+    def _leads_nearer(self, places: list[np.ndarray], look: int) -> bool:
+        ahead = self._plan[self._at:self._at + look, :2]
+        if not len(ahead) or not places:
+            return False
+        now = np.hypot(*(self.pose[:2] - np.array(places)).T)
+        least = np.hypot(*(ahead[:, None] - np.array(places)).T).min(axis=1)
+        return bool(((least < BODY + PERSON + 0.05) & (least < now - 0.02)).any())
 
 
 def drive(cars: list[Car], floor: Floor, executor: SingleThreadedExecutor, minutes: float) -> None:
