@@ -65,8 +65,10 @@ def _parameters(case: Case, settings: Settings) -> dict[str, Any]:
     """Return the node's parameters for a problem, those that are not the default."""
     fields = [(item, getattr(owner, item.name)) for owner in (case.vehicle, settings) for item in options(type(owner))]
     values = {item.name: item.text_form.write(value) if item.text_form else value for item, value in fields}
-    return {item.name: values[item.name] for item, _ in fields if values[item.name] != item.default} | dict(case.request) | {
-        "map_file": case.map.resolve()}
+    given = {item.name: values[item.name] for item, _ in fields if values[item.name] != item.default} | dict(case.request)
+    # In quotes, or ROS takes the text of a footprint for a list of lists, which no parameter is.
+    texts = {name: f"'{value}'" for name, value in given.items() if isinstance(value, str)}
+    return given | texts | {"map_file": case.map.resolve()}
 
 
 def _of_problem(client: "NodeClient", case: Case, count: int) -> Iterator[dict[str, Any]]:
