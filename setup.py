@@ -65,6 +65,10 @@ setup(
     maintainer="dubins_rrt_ros maintainers",
     license="Apache-2.0",
     python_requires=">=3.11",
+    classifiers=[
+        "Intended Audience :: Science/Research", "Operating System :: POSIX :: Linux", "Programming Language :: Python :: 3.11",
+        "Programming Language :: Python :: 3.12", "Programming Language :: Python :: 3.13", "Topic :: Scientific/Engineering",
+    ],
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
     package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.planning._kernels": ["*.pxd"],
                   f"{PACKAGE}.cli.play": ["*.html", "*.css", "*.js"]},
