@@ -1,6 +1,7 @@
 """What a release has to agree on: package.xml, setup.py, the package and CHANGELOG.rst."""
 
 import re
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -41,3 +42,13 @@ def test_package_xml_and_setup_agree():
     assert in_package_xml("description").startswith(in_setup("description"))
     for keyword in ("author", "maintainer", "license"):
         assert in_package_xml(keyword) == in_setup(keyword)
+
+
+def test_nothing_is_claimed_that_is_not_tried():
+    """Wheels are tried by .ci/packages, on Linux."""
+    setup, packages = ((ROOT / name).read_text("utf-8") for name in ("setup.py", ".ci/packages"))
+    tried = re.search(r"for version in ([\d. ]+);", packages)[1].split()
+    assert re.findall(r'"Programming Language :: Python :: (.*?)"', setup) == tried
+    assert re.findall(r'"Operating System :: (.*?)"', setup) == ["POSIX :: Linux"]
+    builds = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["cibuildwheel"]["build"]
+    assert builds == " ".join(f"cp{version.replace('.', '')}-*" for version in tried)

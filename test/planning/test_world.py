@@ -196,6 +196,18 @@ def test_a_world_goes_without_what_was_computed_when_it_is_pickled(make):
     assert plan(again, QUICK).path == plan(problem_in(world), QUICK).path
 
 
+@needs_compiled
+@pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
+def test_a_plan_that_is_pickled_is_the_same_and_its_problem_plans_the_same(make):
+    answer = plan(problem_in(world_of(make)), QUICK)
+    again = pickle.loads(pickle.dumps(answer))
+    again.check()
+    assert (again.status, again.path, again.message) == (answer.status, answer.path, answer.message)
+    for tree in (again.tree, pickle.loads(pickle.dumps(answer.tree)), plan(again.problem, again.settings).tree):
+        assert tree.poses.tobytes() == answer.tree.poses.tobytes() and tree.costs.tobytes() == answer.tree.costs.tobytes()
+
+
+
 @pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
 def test_a_world_is_let_go(make):
     world = world_of(make)
