@@ -39,17 +39,21 @@ def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
     """
     try:
         data = Path(certificate).read_bytes()
-        document = json.loads(gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data)
+        document = json.loads(gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data, parse_constant=_refuse)
         world = read_map(map_path, bool(document["map"]["allow_unknown"]))
         _demand(document["map"] == world.description | {"allow_unknown": document["map"]["allow_unknown"]},
                 "the map is not the one that the certificate is for")
         _Path(document, world).check()
         _Bound(document, world).check()
-    except (KeyError, IndexError, TypeError, ValueError, OverflowError, EOFError, gzip.BadGzipFile) as error:
+    except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, EOFError, gzip.BadGzipFile) as error:
         if isinstance(error, UnreadableMap):
             raise
         raise Refused(f"the file is not as certificates are: {type(error).__name__}: {error}") from None
     return {name: document[name] for name in ("request", "length", "bound", "gap")}
+
+
+def _refuse(number: str) -> None:
+    raise ValueError(f"{number} is no number of a certificate")
 
 
 def _demand(holds: Any, otherwise: str) -> None:
@@ -68,6 +72,8 @@ class _Path:
     def check(self) -> None:
         """Raise Refused where it is not free, does not end at the goal, or is longer than claimed."""
         length, bound, gap = self._claim
+        sizes = (self._request[name] for name in ("robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw"))
+        _demand(self._radius > 0 and min(sizes) >= 0, "the vehicle or a tolerance has a size below 0")
         own = sum(metres for _, _, metres in self._segments)
         can = [metres >= 0 and word in ("L", "S", "R") and radius >= self._radius * (1 - END)
                for word, radius, metres in self._segments]
@@ -189,6 +195,7 @@ class _Bound:
     def _check_blocked(self, some: np.ndarray) -> None:
         """Show that squares hold no place where the inscribed disc may be: the middle of each part is too near to an obstacle."""
         side, parts = self._squares.side, int(self._document["squares"]["parts"])
+        _demand(side > 0 and parts > 0, "the squares have no size")
         row, column = np.divmod(some, self._squares.columns)
         shares = (np.arange(parts) + 0.5) / parts
         x = self._squares.corner[0] + side * (column[:, None, None] + shares)

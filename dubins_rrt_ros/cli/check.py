@@ -34,7 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
     except (UnreadableMap, OSError) as error:
         raise UsageError(str(error)) from None
     request = claim["request"]
-    print(f"{arguments.certificate} holds: a path of {claim['length']:.4f} m from {request['start']} to {request['goal']} for a "
-          f"turning radius of {request['turning_radius']:g} m, and no path is shorter than {claim['bound']:.4f} m; so it is at "
-          f"most {100 * claim['gap']:.3g} % above the shortest possible.")
+    vehicle = f"a footprint of {len(request['footprint'])} corners" if request["footprint"] else (
+        f"a robot radius of {request['robot_radius']:g} m")
+    print(f"{arguments.certificate} holds: a path of {claim['length']:.4f} m from {request['start']} to {request['goal']} for "
+          f"{vehicle} and a turning radius of {request['turning_radius']:g} m, and no path is shorter than {claim['bound']:.4f} "
+          f"m; so it is at most {100 * claim['gap']:.3g} % above the shortest possible.")
     return 0

@@ -77,6 +77,14 @@ def test_each_part_of_the_claim_is_looked_at(field, value, said, of_hall, tmp_pa
     assert said in verdict(of_hall.document | {field: value}, of_hall.file, tmp_path)
 
 
+def test_squares_without_parts_and_a_vehicle_without_a_size_are_refused(of_hall, tmp_path):
+    squares, request = of_hall.document["squares"], of_hall.document["request"]
+    assert "no size" in verdict(of_hall.document | {"squares": squares | {"parts": 0}}, of_hall.file, tmp_path)
+    for name in ("robot_radius", "goal_tolerance_xy"):
+        assert "below 0" in verdict(of_hall.document | {"request": request | {name: -1.0}}, of_hall.file, tmp_path)
+        assert "no number" in verdict(of_hall.document | {"request": request | {name: float("nan")}}, of_hall.file, tmp_path)
+
+
 @pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b"\x1f\x8bnothing", b"{\"map\": 1}", gzip.compress(b"{")])
 def test_what_is_no_certificate_is_refused(content, of_hall, tmp_path):
     (tmp_path / "path.cert").write_bytes(content)
