@@ -21,7 +21,7 @@ from dubins_rrt_ros.planning import (
 )
 
 VEHICLE = Vehicle(turning_radius=0.8, robot_radius=0.3)
-SETTINGS = Settings(seed=0, samples=200, planning_time=60.0)
+SETTINGS = Settings(seed=0, samples=200, planning_time=60.0, length_proof=False)
 BUILDINGS = {
     "office": (lambda: office(6), (2.5, 2.5, 0.0), (27.5, 27.5, 1.0)),
     "serpentine": (lambda: serpentine(10), (1.0, 1.0, 0.0), (10.0, 20.8, math.pi)),
