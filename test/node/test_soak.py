@@ -35,14 +35,14 @@ LOG = 5000
 
 @pytest.mark.slow
 @pytest.mark.minute
-def test_soak(planners, request, record_property, monkeypatch):
+def test_soak(installed_planners, request, record_property, monkeypatch):
     seconds, seed = request.config.getoption("--soak"), request.config.getoption("--soak-seed")
     seed = int(np.random.SeedSequence().entropy % 2**31) if seed is None else seed
     print(f"repeat it with --soak {seconds:g} --soak-seed {seed}")
     for name, value in ALLOCATOR.items():
         monkeypatch.setenv(name, value)
-    process = planners.start(**AT_REST)
-    soak = Soak(planners.client(listens_to_tree=True), np.random.default_rng(seed))
+    process = installed_planners.start(**AT_REST)  # a fork would keep the allocator of its parent
+    soak = Soak(installed_planners.client(listens_to_tree=True), np.random.default_rng(seed))
     memory, others = [], []
     begin = time.monotonic()
     try:
