@@ -22,6 +22,7 @@ from .curves.angles import wrap
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
+from .diagnosis.components import are_separated
 from .planner import AUDIT_RESERVE, SAME, plan, with_seed
 from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
@@ -349,7 +350,14 @@ class _Call:
         x, y, _ = stop.poses[0]
         name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
         status, why = found.status, f"On the way to {name} at ({x:.3f}, {y:.3f}): {found.message}"
-        if found.path:
+        free_headings = any(yaw is None for _, _, yaw in self._waypoints)
+        if found.status == Status.TIMEOUT or (
+                found.status == Status.NO_VALID_PATH and free_headings and not are_separated(found.problem, self.world.field)):
+            # What is proved of one heading at a waypoint is not proved of all; and a leg has but a part of the time.
+            status = Status.TIMEOUT
+            limit = self._settings.planning_time
+            why = f"On the way to {name} at ({x:.3f}, {y:.3f}): No path within planning_time {limit:g} s; allow more time."
+        elif found.path:
             status = Status.TIMEOUT
             why = f"No path reaches {name} at ({x:.3f}, {y:.3f}) with a heading that leads on; allow more planning_time."
         elif found.message.startswith("Start "):

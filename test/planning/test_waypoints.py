@@ -19,6 +19,7 @@ from dubins_rrt_ros.planning import (
     Settings,
     Status,
     Vehicle,
+    load_map,
     plan,
     plan_through,
     prepare,
@@ -289,3 +290,12 @@ def test_the_cheapest_chain_is_that_of_all_chains():
         assert cheapest_chain(costs) == [0, i, j, k]
         assert first_impassable(costs) is None
         assert first_impassable([costs[0], np.full((4, 3), math.inf), costs[2]]) == 1
+
+
+@needs_compiled
+def test_what_is_proved_of_one_heading_at_a_waypoint_is_not_proved_of_all():
+    """There is a path; the time is too short for it."""
+    problem = Problem(load_map("maze"), Vehicle(1.0, 0.2), (1.5, 2.0, 1.57), (13.5, 10.5, 1.57))
+    result = plan_through(problem, [(5.5, 5.0), (9.0, 6.5, 0.0)], Settings(seed=1, planning_time=0.02))
+    assert result.solved or result.status == Status.TIMEOUT
+    assert result.solved or "No path within planning_time 0.02 s" in result.message or "leads on" in result.message
