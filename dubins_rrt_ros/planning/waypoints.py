@@ -350,9 +350,10 @@ class _Call:
         x, y, _ = stop.poses[0]
         name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
         status, why = found.status, f"On the way to {name} at ({x:.3f}, {y:.3f}): {found.message}"
-        free_headings = any(yaw is None for _, _, yaw in self._waypoints)
-        if found.status == Status.TIMEOUT or (
-                found.status == Status.NO_VALID_PATH and free_headings and not are_separated(found.problem, self.world.field)):
+        of_all_headings = found.problem.start == self._problem.start and found.problem.any_goal_heading
+        is_proof = (of_all_headings or all(yaw is not None for _, _, yaw in self._waypoints)
+                    or are_separated(found.problem, self.world.field))
+        if found.status == Status.TIMEOUT or (found.status == Status.NO_VALID_PATH and not is_proof):
             # What is proved of one heading at a waypoint is not proved of all; and a leg has but a part of the time.
             status = Status.TIMEOUT
             limit = self._settings.planning_time
