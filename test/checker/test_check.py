@@ -85,7 +85,17 @@ def test_squares_without_parts_and_a_vehicle_without_a_size_are_refused(of_hall,
         assert "no number" in verdict(of_hall.document | {"request": request | {name: float("nan")}}, of_hall.file, tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b"\x1f\x8bnothing", b"{\"map\": 1}", gzip.compress(b"{")])
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(b"", id="empty"),
+        pytest.param(b"{}", id="no keys"),
+        pytest.param(b"[1]", id="a list"),
+        pytest.param(b"{\"map\": 1}", id="a map that is a number"),
+        pytest.param(b"\x1f\x8bnothing", id="no gzip"),
+        pytest.param(gzip.compress(b"{"), id="cut JSON in gzip"),
+    ],
+)
 def test_what_is_no_certificate_is_refused(content, of_hall, tmp_path):
     (tmp_path / "path.cert").write_bytes(content)
     with pytest.raises(Refused, match=re.escape("the file is not as certificates are")):
