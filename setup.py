@@ -8,6 +8,8 @@ from pathlib import Path
 from setuptools import Extension, find_packages, setup
 
 PACKAGE = "dubins_rrt_ros"
+# `colcon build --symlink-install` runs a link to this file, in a folder without a README.
+SOURCE = Path(__file__).resolve().parent
 KERNELS = f"{PACKAGE}/planning/_kernels"
 
 
@@ -59,7 +61,7 @@ setup(
     name=PACKAGE,
     version="0.1.0",
     description="Dubins RRT and RRT* for ROS 2: collision-free paths for vehicles that cannot turn on the spot",
-    long_description=Path("README.md").read_text(encoding="utf-8"),
+    long_description=(SOURCE / "README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     author="dubins_rrt_ros maintainers",
     maintainer="dubins_rrt_ros maintainers",

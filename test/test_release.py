@@ -1,6 +1,8 @@
 """What a release has to agree on: package.xml, setup.py, the package and CHANGELOG.rst."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -52,3 +54,12 @@ def test_nothing_is_claimed_that_is_not_tried():
     assert re.findall(r'"Operating System :: (.*?)"', setup) == ["POSIX :: Linux"]
     builds = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["cibuildwheel"]["build"]
     assert builds == " ".join(f"cp{version.replace('.', '')}-*" for version in tried)
+
+
+def test_a_linked_setup_reads_the_readme_of_its_source(tmp_path):
+    """`colcon build --symlink-install` runs setup.py by a link from a folder of its own."""
+    (tmp_path / "setup.py").symlink_to(ROOT / "setup.py")
+    command = [sys.executable, "setup.py", "--quiet", "--long-description"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert (ROOT / "README.md").read_text("utf-8").strip() in done.stdout
