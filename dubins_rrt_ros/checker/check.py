@@ -49,7 +49,7 @@ def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
         if isinstance(error, UnreadableMap):
             raise
         raise Refused(f"the file is not as certificates are: {type(error).__name__}: {error}") from None
-    return {name: document[name] for name in ("request", "length", "bound", "gap")}
+    return {name: document[name] for name in ("request", "length", "bound")}
 
 
 def _refuse(number: str) -> None:
@@ -66,20 +66,18 @@ class _Path:
 
     def __init__(self, document: dict[str, Any], world: World):
         self._request, self._world, self._segments = document["request"], world, document["path"]
-        self._claim = document["length"], document["bound"], document["gap"]
+        self._length = document["length"]
         self._radius = float(self._request["turning_radius"])
 
     def check(self) -> None:
         """Raise Refused where it is not free, does not end at the goal, or is longer than claimed."""
-        length, bound, gap = self._claim
         sizes = (self._request[name] for name in ("robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw"))
         _demand(self._radius > 0 and min(sizes) >= 0, "the vehicle or a tolerance has a size below 0")
         own = sum(metres for _, _, metres in self._segments)
         can = [metres >= 0 and word in ("L", "S", "R") and radius >= self._radius * (1 - END)
                for word, radius, metres in self._segments]
         _demand(all(can), "the path turns tighter than the vehicle can, or drives backwards")
-        _demand(own <= length * (1 + MARGIN), f"the path is {own:.6f} m long")
-        _demand(length <= (1 + gap) * bound, f"{length:.6f} m are more than {100 * gap:.4f} % above {bound:.6f} m")
+        _demand(own <= self._length * (1 + MARGIN), f"the path is {own:.6f} m long")
         poses = self._poses()
         x, y, heading = self._world.own(self._request["goal"])
         off = math.hypot(poses[-1, 0] - x, poses[-1, 1] - y) - self._request["goal_tolerance_xy"]
@@ -256,23 +254,21 @@ class _Bound:
         return ~closed
 
     def _check_edges(self, portals: Portals, start: int, goals: set[int], enough: float) -> None:
-        """Show that no potential is higher than one before it and the curves from there."""
-        self._check_pairs(self._start_box, portals, [key for key in portals if key[0] == start])
-        for (before, after), all_boxes in portals.items():
-            # After the others what is left of the way to the goal is too long by itself.
-            boxes = all_boxes[all_boxes[:, 8] + all_boxes[:, 10] < enough]
-            self._check_pairs(boxes, portals, [key for key in portals if key[0] == after and key[1] != before])
-            if after in goals:
-                self._check_pairs(boxes, {(after, after): self._goal_boxes}, [(after, after)])
-        if start in goals:
-            self._check_pairs(self._start_box, {(start, start): self._goal_boxes}, [(start, start)])
+        """Show that no potential is higher than the curves from the start allow, or those before it and the curves from there."""
+        # After the others what is left of the way to the goal is too long by itself.
+        opened = {key: boxes[boxes[:, 8] + boxes[:, 10] < enough] for key, boxes in portals.items()}
+        for (before, after), boxes in portals.items():
+            self._check_boxes(boxes, [opened[key] for key in opened if key[1] == before and key[0] != after], before == start)
+        self._check_boxes(self._goal_boxes, [opened[key] for key in opened if key[1] in goals], start in goals)
 
-    def _check_pairs(self, boxes: np.ndarray, portals: Portals, following: list[Portal]) -> None:
-        for key in following:
-            excess = too_high(boxes, portals[key], self._radius, self._margin)
-            if excess.max(initial=0) > 0:
-                place = portals[key][excess.argmax(), (0, 1, 6)].round(3).tolist()
-                raise Refused(f"the potential at {place} is {excess.max():.3g} m higher than those before it allow")
+    def _check_boxes(self, boxes: np.ndarray, ahead: list[np.ndarray], is_first: bool) -> None:
+        excess = too_high(self._start_box, boxes, self._radius, self._margin)
+        if not is_first:
+            boxes = boxes[excess > 0]
+            excess = np.max([too_high(some, boxes, self._radius, self._margin) for some in ahead], axis=0, initial=0)
+        if excess.max(initial=0) > 0:
+            place = boxes[excess.argmax(), (0, 1, 6)].round(3).tolist()
+            raise Refused(f"the potential at {place} is {excess.max():.3g} m higher than those before it allow")
 
 
 def goal_boxes(goal: tuple[float, float, float], tolerance: float, turn: float, bound: float) -> np.ndarray:

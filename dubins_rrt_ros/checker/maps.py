@@ -71,9 +71,11 @@ def read_map(path: str | Path, allow_unknown: bool) -> World:
     try:
         if path.suffix in (".yaml", ".yml"):
             return _grid(yaml.safe_load(path.read_text("utf-8")), path.parent, allow_unknown)
-        return _polygons(_free_space(path))
+        if path.suffix in (".json", ".geojson", ".wkt"):
+            return _polygons(_free_space(path))
     except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError, shapely.GEOSException) as error:
         raise UnreadableMap(f"{path}: {type(error).__name__}: {error}") from None
+    raise UnreadableMap(f"{path} states no thresholds; give a map_server YAML file of it, or polygons as GeoJSON or WKT")
 
 
 def _grid(fields: dict[str, Any], folder: Path, allow_unknown: bool) -> World:

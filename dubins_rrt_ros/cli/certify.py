@@ -13,11 +13,12 @@ def add_arguments(parser: Parser) -> None:
     describe(
         parser, usage="MAP --start X Y YAW --goal X Y YAW --out FILE.cert [options]",
         description="Plans a path on a map, proves that no path is much shorter, and writes both for `dubins_rrt check`.",
-        notes="The proof is of the length, at any preferred_clearance; with 0 the path is the shortest that was found.",
+        notes="The map is a map_server YAML file, or polygons as GeoJSON or WKT. The proof is of the length, at any "
+              "preferred_clearance; with 0 the path is the shortest that was found.",
         examples=[f"dubins_rrt certify {MAP} {ENDS} --seconds 2 --out path.cert", f"dubins_rrt check path.cert {MAP}"],
         exit_status="0 the file is written, 1 no path: its error_code and the reason are on standard error, 2 wrong usage, "
                     "130 interrupted")
-    plan.add_request_arguments(parser)
+    plan.add_request_arguments(parser, certified=True)
     parser.add_argument("--out", metavar="FILE.cert", required=True, help="the file to write")
     add_certificate_flags(parser)
 

@@ -16,7 +16,7 @@ from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, 
 from dubins_rrt_ros.planning.problem import DoubtfulYaw, Waypoint, checked_waypoint, doubt_about_yaw
 from dubins_rrt_ros.planning.vehicle import overridden
 
-from .common.certificates import add_certificate_flags, write_proof
+from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, write_proof
 from .common.example import ENDS, EXAMPLE, MAP
 from .common.flags import add_option_flags, add_paper_flag, flag, given_options, given_settings
 from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
@@ -66,19 +66,24 @@ def add_arguments(parser: Parser) -> None:
                              "its seed and as many samples as it drew, and no time limit, so that the path is the same")
 
 
-def add_request_arguments(parser: Parser) -> list[argparse.Action]:
-    """Give a parser the arguments of a request; return those that are required."""
-    required = [add_map_arguments(parser)]
+def add_request_arguments(parser: Parser, certified: bool = False) -> list[argparse.Action]:
+    """Give a parser the arguments of a request; return those that are required.
+
+    Args:
+        certified: leave those out with which a path has no certificate.
+    """
+    required = [add_map_arguments(parser, pictures=not certified)]
     for name, text in (("--start", "start pose of the vehicle"), ("--goal", "goal pose of the vehicle")):
         required.append(parser.add_argument(name, nargs=3, type=float, metavar=("X", "Y", "YAW"), required=True,
                                             default=argparse.SUPPRESS, help=f"{text} [m, m, rad]"))
-    parser.add_argument("--via", nargs="+", type=float, action="append", metavar=("X Y", "YAW"), default=argparse.SUPPRESS,
-                        help="waypoint between start and goal [m, m, rad]; one flag for each, in their order; without YAW it is "
-                             "passed with the heading that makes the whole path shortest")
+    if not certified:
+        parser.add_argument("--via", nargs="+", type=float, action="append", metavar=("X Y", "YAW"), default=argparse.SUPPRESS,
+                            help="waypoint between start and goal [m, m, rad]; one flag for each, in their order; without YAW "
+                                 "it is passed with the heading that makes the whole path shortest")
     parser.add_argument("--degrees", action="store_true", default=argparse.SUPPRESS,
-                        help="take the yaws of --start, --via and --goal in degrees; what is written stays in radians")
+                        help="take the yaws of all poses in degrees; what is written stays in radians")
     for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
-        add_option_flags(parser, title, cls)
+        add_option_flags(parser, title, cls, without=UNCERTIFIED if certified else ())
     add_paper_flag(parser)
     return required
 
@@ -90,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     request = _request(arguments)
     if arguments.certificate and request.waypoints:
         raise UsageError("a path through waypoints has no certificate; leave --via out")
+    checked_map = certifiable_map(request.problem, request.map_name) if arguments.certificate else None
     watch = _Watch(request.settings, is_animation(arguments.plot))
     with _interrupt() as cancel, watch.shown() as on_progress:
         if request.waypoints:
@@ -101,8 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
     _write(answer, request.map_name, arguments)
     if arguments.plot:
         watch.draw(arguments.plot, answer)
-    if arguments.certificate and answer.path:
-        claim = write_proof(arguments.certificate, answer, request.map_name, arguments.gap, arguments.seconds)
+    if checked_map and answer.path:
+        claim = write_proof(arguments.certificate, answer, checked_map, arguments.gap, arguments.seconds)
         print(claim, file=words_for(arguments.json))
     return 0 if answer.path else 1
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_rrt_ros.checker.maps import read_map
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan, save_map
-from dubins_rrt_ros.planning.certificate.certificate import certify
+from dubins_rrt_ros.planning.certificate.certificate import certify, checked_map
 from support.cases import boxes_grid, maze_grid
 
 #: A path is planned with so many samples, and proved to be so near to the shortest.
@@ -33,7 +33,7 @@ def certified(grid, vehicle, start, goal, folder, gap=0.05, seconds=20.0, **requ
     answer = plan(problem, SETTINGS)
     if answer.path is None:
         return None
-    document = certify(problem, answer.path, folder / "map.yaml", gap, seconds)
+    document = certify(problem, answer.path, checked_map(problem, folder / "map.yaml"), gap, seconds)
     return Certified(document, grid, answer.path, folder / "map.yaml")
 
 
@@ -123,7 +123,6 @@ def spoiled(certified, name, rng):
     """A copy of a certificate's document with a false claim."""
     document = copy.deepcopy(certified.document)
     SPOILS[name](certified, document, rng)
-    document["gap"] = max(document["gap"], document["length"] / document["bound"] - 1 + 1e-12)
     return document
 
 

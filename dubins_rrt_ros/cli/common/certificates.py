@@ -1,14 +1,18 @@
 """Certificates of paths, as commands write them."""
 
 import argparse
+from typing import Any
 
-from dubins_rrt_ros.planning import Plan
+from dubins_rrt_ros.checker.maps import World
+from dubins_rrt_ros.planning import Plan, Problem
 
 from .parser import UsageError
 from .request import find_map_or_suggest
 
 #: Gap down to which the proof goes, and approximate time for it [s].
 GAP, SECONDS = 0.005, 30.0
+#: Options of a request with which a path has no certificate.
+UNCERTIFIED = ("start_slack",)
 
 
 def add_certificate_flags(parser: argparse.ArgumentParser) -> None:
@@ -20,14 +24,32 @@ def add_certificate_flags(parser: argparse.ArgumentParser) -> None:
                        help=f"approximate time for the proof; what is proved then is written; default {SECONDS:g}")
 
 
-def write_proof(file: str, answer: Plan, map_name: str, gap: float, seconds: float) -> str:
-    """Prove how short a plan's path is, write its certificate, and return what it claims in a sentence."""
-    from dubins_rrt_ros.planning.certificate.certificate import CertificateError, certify, write_certificate  # few plans need it
-    assert answer.path is not None
+def certifiable_map(problem: Problem, map_name: str) -> World:
+    """Return a problem's map as the checker reads it.
+
+    Raises:
+        UsageError: paths of the problem can have no certificate.
+    """
+    from dubins_rrt_ros.planning.certificate.certificate import CertificateError, checked_map  # few plans need it
     try:
-        document = certify(answer.problem, answer.path, find_map_or_suggest(map_name), gap, seconds)
+        return checked_map(problem, find_map_or_suggest(map_name))
     except CertificateError as error:
         raise UsageError(str(error)) from None
+
+
+def write_proof(file: str, answer: Plan, world: World, gap: float, seconds: float) -> str:
+    """Prove how short a plan's path is, write its certificate, and return what it claims in a sentence."""
+    from dubins_rrt_ros.planning.certificate.certificate import certify, write_certificate
+    assert answer.path is not None
+    document = certify(answer.problem, answer.path, world, gap, seconds)
     write_certificate(file, document)
-    return (f"{file}: no path is shorter than {document['bound']:.4f} m; the path, {document['length']:.4f} m, is proved to be "
-            f"at most {100 * document['gap']:.3g} % above the shortest possible.")
+    return f"{file}: a path of {document['length']:.4f} m, and {proved(document)}"
+
+
+def proved(claim: dict[str, Any]) -> str:
+    """Return the end of a sentence: what a certificate proves of all paths."""
+    length, bound = claim["length"], claim["bound"]
+    if bound <= 0:
+        return "nothing is proved of how short others are."
+    return (f"no path is shorter than {bound:.4f} m; so it is at most {100 * (length / bound - 1):.3g} % above the shortest "
+            "possible.")

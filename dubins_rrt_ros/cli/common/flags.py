@@ -1,6 +1,7 @@
 """The library's options as flags of the command line."""
 
 import argparse
+from collections.abc import Collection
 from typing import Any
 
 from dubins_rrt_ros.planning import Settings, options
@@ -8,10 +9,10 @@ from dubins_rrt_ros.planning.option import Option
 from dubins_rrt_ros.planning.settings import PAPER
 
 
-def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type) -> None:
-    """Give `parser` a flag for every option of the dataclass `cls`, such as --turning-radius for turning_radius."""
+def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type, without: Collection[str] = ()) -> None:
+    """Give `parser` a flag for every option of the dataclass `cls` but some, such as --turning-radius for turning_radius."""
     group = parser.add_argument_group(title)
-    for item in options(cls):
+    for item in (item for item in options(cls) if item.name not in without):
         text = f"{item.describe()}; default {_shown_default(item)}".replace("%", "%%")
         group.add_argument(flag(item.name), default=argparse.SUPPRESS, help=text, **_keywords(item))
 

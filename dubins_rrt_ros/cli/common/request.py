@@ -47,12 +47,14 @@ class LoadedRequest(NamedTuple):
     waypoints: tuple[Waypoint, ...] = ()
 
 
-def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
-    """Give `parser` the argument MAP, which is returned, and the flag --max-map-cells."""
+def add_map_arguments(parser: argparse.ArgumentParser, pictures: bool = True) -> argparse.Action:
+    """Give `parser` the argument MAP, which is returned, and the flags for it, those for pictures too if they are wanted."""
     action = parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
                                  help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
                         help=f"maximum number of cells of a grid; default {MAX_MAP_CELLS}")
+    if not pictures:
+        return action
     parser.add_argument("--resolution", metavar="m", type=float, default=None,
                         help=f"side of a cell of a picture ({', '.join(PICTURE_ENDINGS)}) that is the map, without a YAML file "
                              "[m]: white is free, black occupied, grey unknown, and its lower left corner at (0, 0)")
@@ -63,7 +65,7 @@ def add_map_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
 
 def map_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return the keyword arguments of load_map that the flags of `add_map_arguments` give."""
-    return {name: getattr(arguments, name) for name in MAP_FLAGS}
+    return {name: getattr(arguments, name) for name in MAP_FLAGS if name in arguments}
 
 
 def find_map_or_suggest(name: str) -> Path:

@@ -30,7 +30,7 @@ class Bisection:
         self._target = target
         while not is_over() and len(self._cover) < MAX_BOXES:
             total = self._totals()
-            self.bound = float(total.min(initial=target))
+            self.bound = float(max(total.min(initial=target), self._from_start(self._cover.ends.goals, 0.0).min()))
             chosen = self._cover.is_free & (total < self.bound + SPLIT_SHARE * (target - self.bound))
             if not chosen.any():
                 return
@@ -40,10 +40,16 @@ class Bisection:
         """Return the least costs of chains through each box [m], the target where they are at least that."""
         boxes, cover = self._cover.boxes(), self._cover
         left = boxes[:, 10] - cover.ends.excess
-        up_to = self._sweep(boxes, boxes[:, 9], cover.ends.start, left, backwards=False)
+        least = np.maximum(boxes[:, 9], self._from_start(boxes, left))
+        up_to = self._sweep(boxes, least, cover.ends.start, left, backwards=False)
         on = self._sweep(boxes, left, cover.ends.goals, up_to, backwards=True)
         cover.potentials = np.minimum(up_to, self._target - left)  # then what is left is too long by itself
         return np.asarray(np.minimum(up_to + on, self._target))
+
+    def _from_start(self, boxes: np.ndarray, left: np.ndarray | float) -> np.ndarray:
+        """Return lower bounds of the curves from the start alone [m], or what the target leaves where that is less."""
+        left = np.full(len(boxes), left)
+        return np.asarray(np.minimum(self._relaxed(self._cover.ends.start, np.zeros(1), boxes, left, False), self._target - left))
 
     def _sweep(self, boxes: np.ndarray, least: np.ndarray, ends: np.ndarray, others: np.ndarray, backwards: bool) -> np.ndarray:
         """Return the costs of chains from the ends to each box, at least `least`; `others` are those of what is left."""

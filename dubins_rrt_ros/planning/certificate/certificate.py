@@ -19,6 +19,7 @@ from ...checker.maps import World as CheckedMap
 from .._kernels import UNLIMITED
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
+from ..deadline import OutOfTime
 from ..errors import PlanningError
 from ..maps.model import GridMap
 from ..problem import Problem
@@ -30,40 +31,25 @@ from .potentials import Potentials
 
 #: Share by which more than the length is proved at first, for what the margins of potentials take.
 SLACK = 1e-8
+#: Share of the time for the choice of levels.
+LEVELS_SHARE = 0.2
 
 
 class CertificateError(PlanningError, ValueError):
     """A request whose path cannot be certified; the message says why."""
 
 
-def certify(problem: Problem, path: Path, map_path: str | File, gap: float, seconds: float,
-            field: ClearanceField | None = None) -> dict[str, Any]:
-    """Return the certificate of a path.
+def checked_map(problem: Problem, map_path: str | File) -> CheckedMap:
+    """Return the map of a problem as the checker reads it, if the problem's paths can have a certificate.
 
     Args:
-        problem: what the path solves; its map is that of the file.
         map_path: a map_server YAML file, or polygons.
-        gap: share by which the path may be longer than the shortest, down to which the bound is to be raised.
-        seconds: approximate time for it.
-        field: the clearance of the map, where it is at hand.
 
     Raises:
         CertificateError: the map is not as the checker reads it, or the request is of a kind that has no certificates.
     """
     if problem.start_slack > 0:
         raise CertificateError("a start that is nearer to an obstacle than allowed has no certificate; leave start_slack out")
-    until = time.perf_counter() + seconds
-    world = _checked_map(problem, map_path)
-    document = _claim(problem, path, world)
-    if inner_radius(document["request"]) > 0:
-        proof = LengthProof(problem, field or ClearanceField(problem.map, problem.allow_unknown), path)
-        proof.run(lambda: time.perf_counter() > until - seconds * 0.8, gap)
-        return document | _Draft(document, world, proof).proved(gap, lambda: time.perf_counter() > until)
-    return document | _without_obstacles(document, world)
-
-
-def _checked_map(problem: Problem, map_path: str | File) -> CheckedMap:
-    """Return the map as the checker reads it."""
     try:
         world = read_map(map_path, problem.allow_unknown)
     except UnreadableMap as error:
@@ -74,9 +60,32 @@ def _checked_map(problem: Problem, map_path: str | File) -> CheckedMap:
     else:
         same = world.free is not None and bool(shapely.equals(world.free, grid.free))
     if not same:
-        raise CertificateError(f"the checker reads {map_path} otherwise than it was planned on; a picture needs its YAML file, "
-                               "without unknown_grey")
+        raise CertificateError(f"the checker of certificates reads {map_path} by map_server's rules, which give another map than "
+                               "this one; leave unknown_grey out")
     return world
+
+
+def certify(problem: Problem, path: Path, world: CheckedMap, gap: float, seconds: float,
+            field: ClearanceField | None = None) -> dict[str, Any]:
+    """Return the certificate of a path.
+
+    Args:
+        problem: what the path solves.
+        world: the problem's `checked_map`.
+        gap: share by which the path may be longer than the shortest, down to which the bound is to be raised.
+        seconds: approximate time for it.
+        field: the clearance of the map, where it is at hand.
+    """
+    begin = time.perf_counter()
+    document = _claim(problem, path, world)
+    proved = _without_obstacles(document, world)
+    if inner_radius(document["request"]) > 0 and path.length > (1 + gap) * proved["bound"]:
+        proof = LengthProof(problem, field or ClearanceField(problem.map, problem.allow_unknown), path)
+        proof.run(lambda: time.perf_counter() > begin + LEVELS_SHARE * seconds, gap)
+        if proof.sets.end > 0:
+            draft = _Draft(document, world, proof)
+            proved = draft.proved(gap, proved["bound"], lambda: time.perf_counter() > begin + seconds) or proved
+    return document | proved
 
 
 def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str, Any]:
@@ -87,7 +96,7 @@ def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str,
     margin = 2 * MARGIN * (length + world.size)
     box = pose_box(*start, 0.0, 0.0, 0.0, math.nan)
     bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
-    return {"bound": bound, "gap": length / bound - 1 + 1e-12, "limit": length, "levels": [], "cells": [], "boxes": [],
+    return {"bound": max(0.0, bound), "limit": length, "levels": [], "cells": [], "boxes": [],
             "squares": {"corner": [0, 0], "side": 1, "parts": 1, "free": []}, "from_start": [], "to_goal": []}
 
 
@@ -114,7 +123,7 @@ class _Draft:
         side = sets.side
         free = sets.is_free & _full(sets.from_start) & _full(sets.to_goal)
         from_start, to_goal = (np.where(_touched(free), nodes, np.nan) for nodes in (sets.from_start, sets.to_goal))
-        levels = proof.levels
+        levels = proof.levels if len(proof.levels) else np.array([sets.end / 2])
         while np.isin(levels, from_start).any():
             levels = np.where(np.isin(levels, from_start), np.nextafter(levels, 0), levels)
         self._squares = Squares((-side, -side), side, from_start, levels)
@@ -126,23 +135,31 @@ class _Draft:
         self._corridor = domain[least < self._limit]
         self._cells = Cells(self._squares, self._corridor)
 
-    def proved(self, gap: float, is_over: Callable[[], bool]) -> dict[str, Any]:
-        """Return the fields of the proof, with a bound for which the path is at most `gap` above, if there is time for it."""
+    def proved(self, gap: float, bound: float, is_over: Callable[[], bool]) -> dict[str, Any] | None:
+        """Return the fields of the proof with the greatest bound that there is time for, if it is above `bound` [m].
+
+        Args:
+            gap: share by which the path may be above the bound that is good enough.
+        """
         cover, radius = self._cover(), float(self._request["turning_radius"])
-        bisection = Bisection(cover, radius)
-        for share in (*(share for share in GAPS if share > gap), gap):
-            bisection.run(self._length / (1 + share) * (1 + SLACK), is_over)
-        bound = Potentials(cover, radius, bisection.bound).bound
-        names = np.column_stack([part[cover.index] for part in cover.pieces[:3]]).tolist()
-        values = np.where(cover.is_free, cover.potentials, np.nan)
-        return {
-            "bound": bound, "gap": self._length / bound - 1 + 1e-12, "limit": self._limit,
+        bisection, boxes = Bisection(cover, radius), None
+        targets = (self._length / (1 + share) * (1 + SLACK) for share in (*(share for share in GAPS if share > gap), gap))
+        for target in (target for target in targets if target > bound):
+            bisection.run(target, is_over)
+            try:
+                potentials = Potentials(cover, radius, bisection.bound, is_over)
+            except OutOfTime:
+                break
+            if potentials.bound > bound:
+                bound, boxes = potentials.bound, cover.document(potentials.values)
+            if bisection.bound < target:
+                break
+        return None if boxes is None else {
+            "bound": bound, "limit": self._limit,
             "squares": {"corner": list(self._squares.corner), "side": self._squares.side, "parts": self._parts,
                         "free": ["".join("01"[is_free] for is_free in row) for row in self._free.tolist()]},
             "from_start": _rows(self._squares.costs), "to_goal": _rows(self._to_goal.costs),
-            "levels": self._squares.levels.tolist(), "cells": self._cells.of_squares(),
-            "boxes": [[*name, way, *shares, *value] for name, way, shares, value
-                      in zip(names, cover.way.tolist(), cover.shares.tolist(), _rows(values[:, None]), strict=True)]}
+            "levels": self._squares.levels.tolist(), "cells": self._cells.of_squares(), "boxes": boxes}
 
     def _cover(self) -> Cover:
         pieces = self._squares.pieces(self._corridor)

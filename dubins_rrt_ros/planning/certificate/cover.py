@@ -71,6 +71,13 @@ class Cover:
         boxes = self.pieces.boxes(self.index, self.way, self.shares, self.margin)
         return np.column_stack([boxes, self.potentials, self._limits[self.index]])
 
+    def document(self, potentials: np.ndarray) -> list[list[float | None]]:
+        """Return the boxes as a certificate has them, with (n,) potentials [m]."""
+        names = np.column_stack([part[self.index] for part in self.pieces[:3]]).tolist()
+        values = [value if is_free else None for value, is_free in zip(potentials.tolist(), self.is_free, strict=True)]
+        return [[*name, way, *shares, value] for name, way, shares, value
+                in zip(names, self.way.tolist(), self.shares.tolist(), values, strict=True)]
+
     def rows(self) -> list[np.ndarray]:
         """Return the indices of the boxes of each portal that may be free."""
         order = np.argsort(self._portal, kind="stable")
