@@ -34,12 +34,13 @@ def updates(planners):
 
 def test_a_part_of_the_map_that_changed_is_taken_as_the_whole_map_with_it_would_be(updates):
     process, client, topic = updates
-    topic.publish(update(DETOUR, slice(20, 100), slice(50, 52)))  # before any map it says nothing
+    topic.publish(update(FREE, slice(20, 100), slice(50, 52)))  # of no map yet; where it comes after the map, it is the same
     publish(client, process, FREE)
     topic.publish(update(DETOUR, slice(15, 100), slice(49, 53)))
     client.wait_for(lambda: process.map_id == id_of(DETOUR), "the changed map")
     topic.publish(update(walled(np.s_[30:40, 50:52]), slice(30, 40), slice(45, 60)))
     client.wait_for(lambda: process.map_id == id_of(DETOUR), "the same map")
+    assert "refused" not in process.output
 
 
 @pytest.mark.parametrize(("changes", "words"), [
