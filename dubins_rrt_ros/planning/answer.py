@@ -81,7 +81,7 @@ def _above_the_least(problem: Problem, settings: Settings, answer: AuditedPath, 
     if not minimises_length(problem, settings):
         gap = gap_above(bounds[1], answer.cost)
         cost = f" with a cost of {answer.cost:.2f} m"
-        return cost + (f", at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else "")
+        return cost + (f", {proved}at most {100 * gap:.1f} % above the least possible" if math.isfinite(gap) else "")
     gap = gap_above(bounds[0], answer.path.length)
     if not math.isfinite(gap):
         return ""

@@ -168,8 +168,7 @@ class _Call:
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
                         self._report_samples)
         self._objective = search.objective
-        if search.objective.is_length:
-            self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over)
+        self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over, search.objective.is_length)
         for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field))):
             if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
                 return trapped
@@ -178,7 +177,7 @@ class _Call:
                 deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
             self._report(search)
             if self._proof and self._best:
-                self._proof.follow(self._best.path, search.length_bounds)
+                self._proof.follow(self._best.path, search.length_bounds, bool(search.bound) or not self._settings.informed)
             deadline.poll()
             if deadline.is_over or (may_end and (deadline.is_due or self._is_proved(search))):
                 break
@@ -189,8 +188,8 @@ class _Call:
         gap = self._settings.stop_gap
         if self._best is None or gap == 0:
             return False
-        if self._proof:
-            return self._proof.holds
+        if search.objective.is_length:
+            return self._proof is not None and self._proof.holds
         return search.bound is not None and self._best.cost <= (1 + gap) * lower_bound(self._problem, search.bound)
 
     def _take_proved(self, bound: float) -> None:
@@ -322,7 +321,7 @@ class _Call:
             self._cost_bound = lower_bound(self._problem, bound)
             self._bound = lower_bound(self._problem, search.make_length_bound())
         if self._proof:
-            self._proof.follow(path, None)
+            self._proof.follow(path, None, not self._settings.informed)
             self._take_proved(self._proof.finish(0.0 if cancelled else self._deadline.left))
         return self._with_path(self._best or audited, cancelled)
 
@@ -381,8 +380,8 @@ class _Call:
         """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
         bound, cost_bound, elapsed = min(self._bound, best.path.length), min(self._cost_bound, best.cost), self._elapsed
-        stop_gap = self._settings.stop_gap
-        proved = self._proof is not None and 0 < stop_gap >= gap_above(bound, best.path.length) - SAME
+        # With a clearance that is preferred, or costs of cells, the cost bounds what is minimised; else it is the length.
+        proved = self._proof is not None and 0 < self._settings.stop_gap >= gap_above(cost_bound, best.cost) - SAME
         message = success_message(self._problem, self._settings, best, (bound, cost_bound), elapsed, cancelled=cancelled,
                                   running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,

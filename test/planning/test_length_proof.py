@@ -15,6 +15,7 @@ from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.planning.proof.length_proof import LengthProof
 from dubins_rrt_ros.planning.proof.level_sets import LevelSets
+from dubins_rrt_ros.planning.search.background import PROOFS, BackgroundJob
 
 START, GOAL = (1.5, 2.0, 1.57), (13.5, 10.5, 1.57)
 
@@ -189,6 +190,26 @@ def test_the_gap_is_told_at_every_request_and_the_path_is_the_same(maze, monkeyp
     assert beside.path == without.path and beside.samples == without.samples
     assert without.lower_bound < beside.lower_bound == beside.cost_lower_bound <= beside.length
     assert "proved" not in beside.message
+
+
+@needs_compiled
+def test_the_length_of_a_roomy_path_is_proved_too(maze, monkeypatch):
+    """The proof begins beside a search that minimises another cost, and raises the bound of the length."""
+    monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 2)
+    jobs = []
+    monkeypatch.setattr(PROOFS, "start", lambda *job: jobs.append(job) or BackgroundJob(never, None))
+    result = plan(maze, Settings(seed=1, samples=500, planning_time=60.0, preferred_clearance=-1.0))
+    [(_, path, bounds)] = jobs
+    proof = LengthProof(maze, maze.world.field, path, bounds)
+    proof.run(rounds(60))
+    assert result.lower_bound < proof.bound <= plan(maze, Settings(seed=1, samples=500, planning_time=60.0)).length
+
+
+@needs_compiled
+def test_with_a_preferred_clearance_a_stop_gap_is_one_of_the_cost(maze):
+    result = plan(maze, Settings(seed=1, samples=10_000_000, planning_time=60.0, preferred_clearance=-1.0, stop_gap=0.1))
+    assert result.cost_gap <= 0.1 + 1e-9
+    assert result.planning_time < 60 and "proved to be at most " in result.message
 
 
 def test_on_one_core_nothing_is_proved_without_a_gap_to_stop_at(maze, monkeypatch):

@@ -20,33 +20,36 @@ NEGLIGIBLE_GAP = 5e-4
 class BackgroundProof:
     """Raises the lower bound of the lengths of a problem's paths towards the length of the best one.
 
-    On one core it would take the search's time: there it is started for a `stop_gap` alone, and waits for `finish`.
+    On one core it would take the search's time: there it is started for a `stop_gap` of the length alone, and waits for `finish`.
     """
 
-    def __init__(self, problem: Problem, field: ClearanceField, settings: Settings, interrupted: Callable[[], bool]):
+    def __init__(self, problem: Problem, field: ClearanceField, settings: Settings, interrupted: Callable[[], bool],
+                 is_length: bool = True):
         """Prepare it; `follow` starts it.
 
         Args:
             interrupted: asked every few milliseconds, from another thread; True ends the proof with the bound so far.
+            is_length: True if the search minimises the length, so that a `stop_gap` is one of the length.
         """
         self._problem, self._field, self._interrupted = problem, field, interrupted
-        self._waits, self._needs_bounds = settings.stop_gap > 0, settings.informed
-        self._gap = settings.stop_gap or NEGLIGIBLE_GAP
+        self._waits = settings.stop_gap > 0 and is_length
+        self._gap = settings.stop_gap if self._waits else NEGLIGIBLE_GAP
         self._is_beside = settings.length_proof and settings.informed and COMPILED and cores() > 1
         self._length, self._is_over = math.inf, False
         self._proof: LengthProof | None = None
         self._job: BackgroundJob[None] | None = None
 
-    def follow(self, path: Path, bounds: LengthBounds | None) -> None:
+    def follow(self, path: Path, bounds: LengthBounds | None, may_start: bool) -> None:
         """Go on with a shorter path, or start.
 
         Args:
-            bounds: of the search, which nothing changes any more, or None as long as there are none.
+            bounds: of the search, which nothing changes any more; computed where there are none.
+            may_start: False as long as the search has more urgent work for the other cores.
         """
         self._length = min(path.length, self._length)
         if self._proof:
             self._proof.length = self._length
-        elif self._job is None and (self._waits or self._is_beside) and (bounds or not self._needs_bounds):
+        elif self._job is None and (self._waits or self._is_beside) and may_start:
             self._job = PROOFS.start(self._run, path, bounds)
 
     def _run(self, path: Path, bounds: LengthBounds | None) -> None:
