@@ -76,6 +76,11 @@ def not_audited_message(path: Path) -> str:
     return f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
 
 
+def defect_message(audit: Audit) -> str:
+    """Return what is said of a path that failed its audit, in a sentence."""
+    return f"A defect in the planner: its path failed the audit: {audit}. Please report it."
+
+
 def _above_the_least(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], proved: str) -> str:
     """Return how far the path is above the shortest, or the cheapest, possible at most."""
     if not minimises_length(problem, settings):

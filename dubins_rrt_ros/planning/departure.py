@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from .answer import not_audited_message
+from .answer import defect_message, not_audited_message
 from .audit.departure import judge_departure
 from .audit.verdict import Audit, audit_path, driven_arcs, in_order
 from .collision.clearance import ClearanceField
@@ -70,7 +70,7 @@ class WholePlans:
 
     Attributes:
         rest: the problem from the end of the departure on.
-        time_for_rest: limit of the time for its plan [s].
+        settings_of_rest: how to plan it, within the time that is left for it.
     """
 
     def __init__(self, problem: Problem, settings: Settings, departure: Departure, world: World, deadline: Deadline):
@@ -88,7 +88,8 @@ class WholePlans:
         self._cost, self._curve_costs = objective.path_cost(self._path), objective.curve_costs(self._path)
         self._audited: tuple[Path, Audit] | None = None
         self._before = deadline.elapsed
-        self.time_for_rest = max(MIN_PLANNING_TIME, deadline.left - min(AUDIT_SHARE * deadline.left, MOST_FOR_AUDIT))
+        time = max(MIN_PLANNING_TIME, deadline.left - min(AUDIT_SHARE * deadline.left, MOST_FOR_AUDIT))
+        self.settings_of_rest = replace(settings, planning_time=time)
 
     def joined(self, plan: Plan) -> Plan:
         """Return the plan of the problem, given that of its rest."""
@@ -107,8 +108,7 @@ class WholePlans:
             status = Status.CANCELLED if cancelled else Status.TIMEOUT
             return self._without_path(answer, status, not_audited_message(path), time_to_first=None, cancelled=cancelled)
         if not audit.ok:
-            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return self._without_path(answer, Status.UNKNOWN, message, audit=audit)
+            return self._without_path(answer, Status.UNKNOWN, defect_message(audit), audit=audit)
         node = np.flatnonzero((plan.tree.poses == plan.path.end).all(axis=1) & (plan.tree.costs == plan.cost))[0]
         message = f"Path of {path.length:.2f} m; {self._message}; from there on: {plan.message}"
         bound = min(bound, path.length)

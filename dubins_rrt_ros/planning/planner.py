@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from .answer import LEAST_IMPROVEMENT, AuditedPath, not_audited_message, success_message
+from .answer import LEAST_IMPROVEMENT, AuditedPath, defect_message, not_audited_message, success_message
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
@@ -140,7 +140,7 @@ class _Call:
         if departure.path is None:
             return self._plan(Status.START_OCCUPIED, departure.message, self._root, location=departure.location)
         whole = WholePlans(self._problem, self._settings, departure, world, self._deadline)
-        rest = _Call(whole.rest, replace(self._settings, planning_time=whole.time_for_rest), self._deadline.cancel,
+        rest = _Call(whole.rest, whole.settings_of_rest, self._deadline.cancel,
                      lambda report: self._on_progress(whole.progress(report)), self._report_samples, self._seed_path)
         rest._limit, rest._before = self._settings.planning_time, self._elapsed
         return replace(whole.joined(rest.answer()), map_time=self._map_time)
@@ -314,8 +314,7 @@ class _Call:
             cancelled = cancelled or self._deadline.cancelled
             return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples)
         if not audited.audit.ok:
-            message = f"A defect in the planner: its path failed the audit: {audited.audit}. Please report it."
-            return self._plan(Status.UNKNOWN, message, tree, samples=samples, audit=audited.audit)
+            return self._plan(Status.UNKNOWN, defect_message(audited.audit), tree, samples=samples, audit=audited.audit)
         self._keep(audited)
         if search and (bound := search.make_bound(self._time_for_bound())):
             self._cost_bound = lower_bound(self._problem, bound)

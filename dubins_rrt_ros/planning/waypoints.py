@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ._kernels import COMPILED
-from .answer import not_audited_message
+from .answer import defect_message, not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
 from .curves.angles import wrap
@@ -136,8 +136,8 @@ class _Call:
             return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
         passed = len(stops[0].waypoints)
         whole = WholePlans(self._problem, self._settings, departure, self.world, self._clock)
-        rest = plan_through(whole.rest, self._waypoints[passed:], replace(self._settings, planning_time=whole.time_for_rest),
-                            cancel=self._cancel, seed_path=self._seed_path)
+        rest = plan_through(whole.rest, self._waypoints[passed:], whole.settings_of_rest, cancel=self._cancel,
+                            seed_path=self._seed_path)
         answer = whole.joined(rest)
         later = len(answer.poses()) - len(rest.poses())
         indices = (*[0] * passed, *(later + index for index in rest.waypoint_indices)) if answer.path else ()
@@ -307,8 +307,7 @@ class _Call:
             return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, not_audited_message(path), tree,
                               samples=self._samples, cancelled=cancelled)
         if not audit.ok:
-            message = f"A defect in the planner: its path failed the audit: {audit}. Please report it."
-            return self._plan(Status.UNKNOWN, message, tree, audit=audit)
+            return self._plan(Status.UNKNOWN, defect_message(audit), tree, audit=audit)
         if self._time_to_first is None:
             self._time_to_first = self._clock.elapsed
         count = len(self._waypoints)

@@ -169,15 +169,19 @@ def test_a_post_that_only_the_swinging_tail_hits_is_found(side, depth):
         assert judged(map, vehicle, curve).ok == (depth < 0)
 
 
+def around_a_post(kind):
+    """20 m x 20 m with a post of 0.1 m x 0.1 m in the middle."""
+    if kind == "polygons":
+        return PolygonMap(shapely.box(0, 0, 20, 20) - shapely.box(10, 10, 10.1, 10.1))
+    data = np.zeros((200, 200))
+    data[100, 100] = 100
+    return GridMap(data, 0.1)
+
+
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_a_post_inside_of_the_footprint_is_contact(kind):
     """Also where the vehicle only stands, and where no corner or edge comes near it."""
-    if kind == "grid":
-        data = np.zeros((200, 200))
-        data[100, 100] = 100
-        map = GridMap(data, 0.1)
-    else:
-        map = PolygonMap(shapely.box(0, 0, 20, 20) - shapely.box(10, 10, 10.1, 10.1))
+    map = around_a_post(kind)
     for x, free in ((9.0, False), (10.9, False), (6.39, True), (11.01, True)):
         pose = (x, 10.0, 0.0)
         verdict = audit_path(Path.of_pose(pose), Problem(map, vehicle_of(CAR), pose, pose))
@@ -198,12 +202,7 @@ def test_a_vehicle_wholly_within_an_obstacle_or_outside_is_found(kind):
 @pytest.mark.parametrize("kind", ["grid", "polygons"])
 def test_the_notch_of_a_footprint_passes_around_a_post(kind):
     """It comes to stand in the missing quarter, whose hind edge is 0.5 m ahead, and whose left edge is 0.1 m to the left."""
-    if kind == "grid":
-        data = np.zeros((200, 200))
-        data[100, 100] = 100
-        map = GridMap(data, 0.1)
-    else:
-        map = PolygonMap(shapely.box(0, 0, 20, 20) - shapely.box(10, 10, 10.1, 10.1))
+    map = around_a_post(kind)
     for ends_at, y, free in ((9.5 - HAIR, 10.5, True), (9.5 + HAIR, 10.5, False),
                              (9.4, 10.0 + HAIR, True), (9.4, 10.0 - HAIR, False)):
         verdict = judged(map, vehicle_of(NOTCHED), straight(5.0, y, 0.0, ends_at - 5.0))
