@@ -35,6 +35,8 @@ REPORT_INTERVAL = 0.05
 SAME = 1e-9
 #: Minimum time between two audits of improvements, in times that the last one took: the search has the rest.
 AUDIT_INTERVAL = 5
+#: Minimum improvement of a cost that is not the length that is simplified and audited before the end, relative to the cost.
+WORTH_SIMPLIFYING = 1e-3
 #: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
 AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
 #: Share of the time, and maximum time [s], that is kept to tell why there is no path.
@@ -225,7 +227,8 @@ class _Call:
         """Return True if the best path is better than the one that was audited last, and the last audit is long enough ago."""
         if self._best is None:
             return True
-        return (search.cost < self._found_cost - LEAST_IMPROVEMENT
+        least = LEAST_IMPROVEMENT if search.objective.is_length else WORTH_SIMPLIFYING * self._found_cost
+        return (search.cost < self._found_cost - least
                 and self._elapsed - self._last_audit >= AUDIT_INTERVAL * (self._audit_took + self._simplifying_took))
 
     def _is_right(self, path: Path | None, search: Search) -> bool:

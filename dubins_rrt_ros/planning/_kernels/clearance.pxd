@@ -31,7 +31,10 @@ cdef class Clearance:
 @cython.final
 cdef class GridClearance(Clearance):
     cdef readonly int[:, ::1] row_gap
+    cdef int[:, ::1] nearest_rows
     cdef double squared_across(self, double x, int row, int column) noexcept nogil
+    cdef int find_nearest_rows(self, int row, int column) noexcept nogil
+    cdef double squared_cells(self, int row, int column, int away, int nearer) noexcept nogil
 
 @cython.final
 cdef class PolygonClearance(Clearance):

@@ -12,6 +12,7 @@ everywhere, and one that keeps `required_clearance + margin` always passes.
 """
 
 import cython
+import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import UNLIMITED, Pose, drive_from
@@ -162,11 +163,14 @@ class GridClearance(Clearance):
     """Clearance from the squares of occupied cells.
 
     `row_gap` holds the distances of each cell to the next occupied ones in its row, as `distance.measure_row_gaps` packs them.
+    `nearest_rows` holds, for the cells that were asked for, the rows in which the nearest square to a point of the cell may lie:
+    the first one as seen from the cell's, times 65536, and their number. Threads write the same there, each at one stroke.
     """
 
     def __init__(self, field, resolution, origin, margin, row_gap):
         Clearance.__init__(self, field, resolution, origin, margin)
         self.row_gap = row_gap
+        self.nearest_rows = np.zeros(row_gap.shape, np.int32)  # which takes memory only where it is written to
 
     @cython.cfunc
     @cython.nogil
@@ -182,25 +186,63 @@ class GridClearance(Clearance):
         return gap * gap
 
     def exact(self, x, y):
-        """Return the distance to the nearest occupied square or the map's edge, row by row outward until rows are too far."""
+        """Return the distance to the nearest occupied square or the map's edge."""
         nearest: cython.double = Clearance.exact(self, x, y)
         nearest = nearest * nearest
-        rows: cython.int = cython.cast(cython.int, self.field.shape[0])
         row: cython.int = self.row_of(y)
         column: cython.int = self.column_of(x)
-        nearest = min(nearest, self.squared_across(x, row, column))
+        if self.nearest_rows[row, column] == 0:
+            self.nearest_rows[row, column] = self.find_nearest_rows(row, column)
+        first: cython.int = self.nearest_rows[row, column] >> 16
+        end: cython.int = first + (self.nearest_rows[row, column] & 65535)
+        if first <= 0 < end:
+            nearest = min(nearest, self.squared_across(x, row, column))
         up: cython.double = (row + 1) * self.resolution - y
         down: cython.double = y - row * self.resolution
         away: cython.int = 1
-        while up * up < nearest or down * down < nearest:
-            if up * up < nearest and row + away < rows:
+        while away < end or away <= -first:
+            if first <= away < end:
                 nearest = min(nearest, up * up + self.squared_across(x, row + away, column))
-            if down * down < nearest and row - away >= 0:
+            if first <= -away < end:
                 nearest = min(nearest, down * down + self.squared_across(x, row - away, column))
             away += 1
             up += self.resolution
             down += self.resolution
         return sqrt(nearest)
+
+    def find_nearest_rows(self, row, column):
+        """Return the rows in which the nearest square to a point of a cell may lie, as `nearest_rows` holds them.
+
+        Rows are left out that are farther from any point of the cell than a square, or the map's edge, is from all of them.
+        """
+        rows: cython.int = cython.cast(cython.int, self.field.shape[0])
+        columns: cython.int = cython.cast(cython.int, self.field.shape[1])
+        side: cython.double = 1 + min(min(row, rows - 1 - row), min(column, columns - 1 - column))
+        farthest: cython.double = side * side
+        most: cython.int = 0
+        while most * cython.cast(cython.double, most) < farthest:
+            farthest = min(farthest, min(self.squared_cells(row + most, column, most, 0),
+                                         self.squared_cells(row - most, column, -most, 0)))
+            most += 1
+        most += 1  # whose nearest point may be as far, so that rounding decides
+        first: cython.int = -most
+        while first <= most and self.squared_cells(row + first, column, first, 1) > farthest:
+            first += 1
+        end: cython.int = most + 1
+        while end > first and self.squared_cells(row + end - 1, column, end - 1, 1) > farthest:
+            end -= 1
+        if first >= end:  # the map's edge is nearer than all squares
+            first, end = 0, 1
+        return first * 65536 + (end - first)
+
+    def squared_cells(self, row, column, away, nearer):
+        """Return the squared distance [cells] from the farthest (0) or nearest (1) point of a cell to the squares of a row."""
+        if not (0 <= row < self.field.shape[0]):
+            return UNLIMITED
+        row_gap: cython.int = self.row_gap[row, column]
+        gap: cython.double = 0 if row_gap == 0 else min(left_gap(row_gap), right_gap(row_gap)) - nearer
+        across: cython.double = max(max(away, -away) - nearer, 0)
+        return gap * gap + across * across
 
     def spans_are_clear(self, first_row, last_row, spans, corners, first, end, along, across):
         """Return whether no cell in the spans is occupied; go from each to where the next occupied one to the right may be."""

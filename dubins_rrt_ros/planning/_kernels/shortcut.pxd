@@ -41,6 +41,7 @@ cdef class Shortcutter:
     cdef Curve new_curve(self, int i) noexcept nogil
     cdef Curve curve_to(self, int pose) noexcept nogil
     cdef Pose pose_of(self, int pose) noexcept nogil
+    cdef Pose pose_of_new(self, int i) noexcept nogil
     cdef bint new_is_free(self) noexcept nogil
     cdef double excess_between(self, double begin, double end) noexcept nogil
     cdef bint pays(self, double s, double least_gain) noexcept nogil

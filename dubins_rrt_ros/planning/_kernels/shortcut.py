@@ -214,7 +214,7 @@ class Shortcutter:
         for i in range(self.kept, self.new):
             if not self.is_free(pose, self.new_curve(i)):
                 return False
-            pose = Pose(self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2])
+            pose = self.pose_of_new(i)
         return True
 
     def is_free(self, pose, curve):
@@ -245,15 +245,33 @@ class Shortcutter:
         for i in range(self.left, edge + 1):
             left += self.costs[i]
         left = left * (1 - least_gain) + self.price * (edge + 1 - self.left - self.new - (1 if length_of(rest) > 0 else 0))
-        pose: Pose = self.pose_of(self.left - 1)
-        for i in range(self.new):
+        # What is kept costs at least its length, so that a change fails most often by its new curves alone.
+        left -= length_of(rest)
+        for i in range(self.kept):
+            left -= length_of(self.new_curve(i))
+        pose: Pose = self.begin
+        for i in range(self.kept, self.new):
             self.new_costs[i] = self.edge_cost.of(pose, self.radius, self.new_curve(i), left)
             left -= self.new_costs[i]
             if left <= 0:
                 return False
-            pose = Pose(self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2])
+            pose = self.pose_of_new(i)
+        left += length_of(rest)
         self.rest_cost = self.edge_cost.of(pose, self.radius, rest, left)
-        return self.rest_cost < left
+        left -= self.rest_cost
+        if left <= 0:
+            return False
+        pose = self.pose_of(self.left - 1)
+        for i in range(self.kept):
+            left += length_of(self.new_curve(i))
+            self.new_costs[i] = self.edge_cost.of(pose, self.radius, self.new_curve(i), left)
+            left -= self.new_costs[i]
+            pose = self.pose_of_new(i)
+        return left > 0
+
+    def pose_of_new(self, i):
+        """Return the i-th pose of the change."""
+        return Pose(self.new_poses[i, 0], self.new_poses[i, 1], self.new_poses[i, 2])
 
     def rest_of(self, edge, s):
         """Return what is left of the curve to a pose from arc length `s` of the path on."""
