@@ -139,9 +139,7 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
 
 
 def _costs(path: Path, problem: Problem, settings: Settings) -> CostFigures:
-    preferred = settings.preferred_clearance_of(problem.vehicle)
-    return CostFigures(cost_of(path, problem, preferred, settings.clearance_weight, settings.weight_of_cells),
-                       roomy_share_of(path, problem, preferred) if preferred > 0 and path.length > 0 else None)
+    return CostFigures(cost_of(path, problem, settings), roomy_share_of(path, problem, settings))
 
 
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:

@@ -138,7 +138,7 @@ def test_a_path_costs_less_than_the_shortest_one_and_the_audit_measures_the_same
     free = GridMap(np.where(problem.map.costs > 0, 0, problem.map.data), 0.2, problem.map.origin, thresholds=COSTMAP)
     shortest_path = plan(replace(problem, map=free), replace(settings, preferred_clearance=0.0))
     assert result.cost == objective.path_cost(result.path) <= 1.001 * objective.path_cost(shortest_path.path)
-    assert result.cost == pytest.approx(cost_of(result.path, problem, preferred, 2.0, WEIGHT), rel=1e-3)
+    assert result.cost == pytest.approx(cost_of(result.path, problem, settings), rel=1e-3)
     assert shortest_path.length <= 1.01 * result.length
     assert result.lower_bound <= result.cost_lower_bound <= result.cost and result.length < result.cost
 
@@ -244,4 +244,4 @@ def test_over_a_grid_of_probabilities_as_cartographer_makes_it():
     assert plan(problem, Settings(seed=1)).status == Status.NO_VALID_PATH
     result = plan(problem, Settings(seed=1, cost_weight=2.0, samples=300, planning_time=10.0))
     assert result.solved and result.cost > result.length + 0.5
-    assert result.cost == pytest.approx(cost_of(result.path, result.problem, 0.0, 0.0, 2.0), rel=1e-3)
+    assert result.cost == pytest.approx(cost_of(result.path, result.problem, result.settings), rel=1e-3)

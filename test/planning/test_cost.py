@@ -136,8 +136,9 @@ def test_no_path_falls_below_the_bounds(vehicle, seed):
         pytest.skip("there is no path")
     shares = np.sort(rng.random(20))
     to_goal, from_start = CostToGo.to_goal(problem, field, objective), CostToGo.from_start(problem, field, objective)
-    driven = np.array([cost_of(part_of(result.path, share), problem, PREFERRED, WEIGHT) for share in shares])
-    whole = cost_of(result.path, problem, PREFERRED, WEIGHT)
+    settings = Settings(preferred_clearance=PREFERRED, clearance_weight=WEIGHT)
+    driven = np.array([cost_of(part_of(result.path, share), problem, settings) for share in shares])
+    whole = cost_of(result.path, problem, settings)
     points = result.path.at(shares)[:, :2]
     assert (from_start.make_bound().at(points) <= driven * 1.0005 + 1e-6).all()
     assert (to_goal.make_bound().at(points) <= (whole - driven) + 0.0005 * whole + 1e-6).all()
@@ -185,11 +186,11 @@ def test_a_path_costs_less_than_the_shortest_one_and_the_audit_measures_the_same
     result.tree.check(field, vehicle)
     assert result.cost == objective.path_cost(result.path)
     assert result.cost <= 1.001 * objective.path_cost(shortest_path.path)
-    assert result.cost == pytest.approx(cost_of(result.path, problem, PREFERRED, WEIGHT), rel=1e-3)
+    assert result.cost == pytest.approx(cost_of(result.path, problem, settings), rel=1e-3)
     assert result.lower_bound <= result.cost_lower_bound <= result.cost and result.length <= result.cost
     assert result.lower_bound <= shortest_path.length
     assert shortest_path.roomy_share is None and result.roomy_share == pytest.approx(
-        roomy_share_of(result.path, problem, PREFERRED), abs=0.02)
+        roomy_share_of(result.path, problem, settings), abs=0.02)
     again = plan(problem, settings)
     assert again.path == result.path and again.cost == result.cost
 

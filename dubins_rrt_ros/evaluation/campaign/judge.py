@@ -122,10 +122,9 @@ def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
 def _check_cost(answer: Plan) -> Iterator[str]:
     """Yield what is wrong with the cost of the path, which is measured anew where it is more than the length."""
     settings, problem = answer.settings, answer.problem
-    preferred = settings.preferred_clearance_of(problem.vehicle)
-    if answer.path is None or answer.cost is None or preferred == 0:
+    if answer.path is None or answer.cost is None or settings.preferred_clearance_of(problem.vehicle) == 0:
         return
-    cost = cost_of(answer.path, problem, preferred, settings.clearance_weight, settings.weight_of_cells)
+    cost = cost_of(answer.path, problem, settings)
     if abs(answer.cost - cost) > COST_ERROR * cost:
         yield f"the cost of the path is {answer.cost:.6g} m, and by the audit {cost:.6g} m"
     if answer.cost_lower_bound > (1 + COST_ERROR) * cost:

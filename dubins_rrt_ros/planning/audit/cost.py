@@ -8,7 +8,7 @@ import numpy as np
 
 from ..maps.model import GridMap
 from ..problem import Problem
-from ..settings import ROOMY
+from ..settings import ROOMY, Settings
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 from .sweep import Arcs, DiscSweep, PolygonSweep, any_time
 from .verdict import driven_arcs
@@ -28,17 +28,17 @@ SHARE_ERROR = 0.02
 AT_ONCE = 2048
 
 
-def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: float, cell_weight: float = 0.0,
-            obstacles: Obstacles | None = None, check_time: Callable[[], None] = any_time) -> float:
+def cost_of(path: "Path", problem: Problem, settings: Settings, obstacles: Obstacles | None = None,
+            check_time: Callable[[], None] = any_time) -> float:
     """Return the cost of a path that is free [m].
 
-    It is the integral of 1 + weight * max(0, 1 - room / preferred_clearance)^2 + cell_weight * (the cost of the cell) / 100.
+    It is the integral of 1 + clearance_weight * max(0, 1 - room / preferred_clearance)^2 + cost_weight * (the cost of the cell)
+    / 100.
 
     Args:
         path: its curves can be driven.
         problem: with map and vehicle.
-        preferred_clearance, weight: of the cost of clearance, which there is none of where one of them is 0 [m].
-        cell_weight: of the costs of the grid's cells, where it has any.
+        settings: with the weights.
         obstacles: those of the problem's map, where they are at hand.
         check_time: called every few milliseconds; what it raises ends the audit.
     """
@@ -46,16 +46,22 @@ def cost_of(path: "Path", problem: Problem, preferred_clearance: float, weight: 
     if not path.curves:
         return cost
     arcs = driven_arcs(path.curves, path.start)[2]
-    if preferred_clearance > 0 and weight > 0:
-        cost += weight * _closeness(arcs, problem, preferred_clearance, obstacles, check_time)
-    if cell_weight > 0 and isinstance(problem.map, GridMap) and problem.map.costs is not None:
+    if (preferred_clearance := settings.preferred_clearance_of(problem.vehicle)) > 0:
+        cost += settings.clearance_weight * _closeness(arcs, problem, preferred_clearance, obstacles, check_time)
+    if (cell_weight := settings.weight_of_cells) > 0 and isinstance(problem.map, GridMap) and problem.map.costs is not None:
         cost += cell_weight * _over_cells(arcs, problem.map, check_time)
     return cost
 
 
-def roomy_share_of(path: "Path", problem: Problem, preferred_clearance: float, obstacles: Obstacles | None = None,
-                   check_time: Callable[[], None] = any_time) -> float:
-    """Return the share of a path's length with room of at least 0.8 preferred clearances; the arguments are as for `cost_of`."""
+def roomy_share_of(path: "Path", problem: Problem, settings: Settings, obstacles: Obstacles | None = None,
+                   check_time: Callable[[], None] = any_time) -> float | None:
+    """Return the share of a path's length with room of at least 0.8 preferred clearances; None where there is none of either.
+
+    The arguments are as for `cost_of`.
+    """
+    preferred_clearance = settings.preferred_clearance_of(problem.vehicle)
+    if preferred_clearance == 0 or path.length == 0:
+        return None
     arcs = driven_arcs(path.curves, path.start)[2]
     return sum(float(size[room >= ROOMY * preferred_clearance].sum())
                for size, room in _rooms(arcs, problem, preferred_clearance, obstacles, check_time)) / path.length
