@@ -190,6 +190,7 @@ def test_best_known_lengths_that_are_none_take_one_line(text, capsys):
     assert "best.json" in refusal(write(RUNS), "--best-known", "best.json", capsys=capsys)
 
 
+@pytest.mark.slow
 def test_the_plot_has_a_line_for_each_planner():
     report(write(RUNS), "--plot", "runs.png")
     pixels = np.round(imread("runs.png")[..., :3] * 255)

@@ -123,6 +123,7 @@ def test_a_pose_that_should_have_been_refused_is_found(name, pose, monkeypatch):
     assert f"NO_VALID_PATH, but at the {name} the vehicle has no room: -0.4" in " ".join(findings_of(trial, monkeypatch))
 
 
+@pytest.mark.slow
 def test_what_the_maker_of_a_problem_knows_counts(monkeypatch):
     assert "it found a path where there is none" in findings_of(walled_trial(fits=False), monkeypatch)
     found, = findings_of(walled_trial(fits=True, walled_off=True), monkeypatch)
@@ -181,6 +182,7 @@ def test_a_process_that_dies_or_hangs_is_told_and_replaced():
     assert {(dies, "the process died with status 3"), (hangs, "no answer within 8 s")} < set(found)
 
 
+@pytest.mark.slow
 def test_after_ctrl_c_what_was_done_is_told(monkeypatch, capsys):
     def interrupted(task):
         if task.number == 2:

@@ -29,6 +29,7 @@ def test_a_number_and_a_seed_give_the_same_problem():
     assert one.curves == again.curves
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_most_tunnels_are_solved_and_none_by_a_longer_path(tmp_path, capsys):
     file = tmp_path / "lines.jsonl"

@@ -67,6 +67,7 @@ def test_a_report_is_written_with_the_figures_of_its_tables(capsys):
     assert error.startswith("# Planners compared\n")
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_campaign_writes_its_counts(capsys):
     document, error = alone("campaign", "--problems", "3", "--seed", "2", "--out", "lines.jsonl", capsys=capsys)

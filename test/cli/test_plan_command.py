@@ -312,6 +312,7 @@ def test_ctrl_c_before_a_path_is_cancelled(hall):
     assert status == 1 and out == "" and "213 CANCELLED: " in shown and "Traceback" not in shown
 
 
+@pytest.mark.slow
 def test_a_plot_may_be_an_animation_of_the_search(hall, capsys, monkeypatch):
     from PIL import Image
     monkeypatch.setattr("dubins_rrt_ros.planning.pictures.animation.MOST_FRAMES", 12)

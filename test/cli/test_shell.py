@@ -101,6 +101,7 @@ def _read(terminal):
         return b""
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_long_work_shows_a_bar_on_a_terminal_and_no_colours_in_a_pipe():
     shown, out = on_a_terminal("campaign", "--problems", "3")

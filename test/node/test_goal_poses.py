@@ -115,6 +115,7 @@ def test_a_waypoint_that_was_passed_is_left_out_when_it_is_planned_again(drive):
     assert math.dist(poses_of(again)[-1, :2], GOAL[:2]) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_waypoint_that_was_passed_while_a_better_path_was_sought_does_not_count_for_the_next(drive):
     box = np.s_[42:58, 46:54]  # without which the first path is proved to be the shortest, and none is sought
     client, topic, process = drive(walled(box), replan_on_map_change=True, samples=10_000_000, planning_time=3.0)

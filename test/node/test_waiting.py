@@ -155,6 +155,7 @@ def test_unknown_space_that_counts_as_free_is_told_in_log_and_status(planners, t
     assert "[WARN]" not in process.output
 
 
+@pytest.mark.slow
 def test_with_a_map_file_the_status_is_that_a_start_is_waited_for(planners, map_file):
     planners.start(map_file=map_file, **QUICK)
     client = planners.client()

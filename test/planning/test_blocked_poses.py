@@ -103,10 +103,8 @@ def test_random_arcs_are_judged_as_the_audit_does(vehicle, smaller):
             arc = Arcs(*(np.array([value]) for value in (x + x0, y + y0, theta, rng.uniform(-1, 1), rng.uniform(0.1, 3.0))))
             poses = np.column_stack(arc.at(np.zeros(2, int), np.array([0.0, arc.length[0]])))
             blocked = bool(blocked_poses(field, vehicle, poses))
-            if not touches(arc, world_map, vehicle, poses):
-                assert not blocked, (number, arc)
-            if touches(arc, world_map, smaller, poses):
-                assert blocked, (number, arc)
+            vehicle_or_smaller = vehicle if blocked else smaller
+            assert touches(arc, world_map, vehicle_or_smaller, poses) == blocked, (number, arc)
             judged[blocked] += 1
     assert min(judged.values()) > 50
 

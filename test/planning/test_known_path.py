@@ -115,6 +115,6 @@ def test_seeded_paths_are_right_in_worlds_that_change(make):
         cells[row:row + 3, column:column + 3] = rng.choice([0, 100])
         world = world.updated(GridMap(cells, world.map.resolution, world.map.origin, percent=True))
         start = (*(corners[0] + rng.uniform(0.05, 0.5, 2) @ (corners[[1, 3]] - corners[0])), rng.uniform(-3, 3))
-        answer = plan(Problem(world, start=start, goal=goal), Settings(samples=100, planning_time=0.2, seed=1), seed_path=path)
+        answer = plan(Problem(world, start=start, goal=goal), Settings(samples=100, planning_time=0.1, seed=1), seed_path=path)
         answer.check()
         path = answer.path or path

@@ -93,8 +93,8 @@ def test_the_goal_must_hold_the_whole_footprint(kind):
     """Its reference point has room enough, its corners have not."""
     map = grid_with_a_gap(slice(72, 88)) if kind == "grid" else polygons_with_a_gap(0.8)
     vehicle = Vehicle(turning_radius=0.8, footprint=ROBOT)
-    across, along = (plan(Problem(map, vehicle, (5.5, 2.0, 0.0), (6.5, 0.35, theta)), Settings(samples=5, seed=1))
-                     for theta in (math.pi / 2, 0.0))
+    settings = Settings(samples=5, planning_time=0.1, seed=1)
+    across, along = (plan(Problem(map, vehicle, (5.5, 2.0, 0.0), (6.5, 0.35, theta)), settings) for theta in (math.pi / 2, 0.0))
     assert across.status == Status.GOAL_OCCUPIED
     assert "the footprint touches the map's edge at (" in across.message
     assert along.status != Status.GOAL_OCCUPIED

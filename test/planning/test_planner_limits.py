@@ -96,8 +96,8 @@ def test_a_search_without_a_path_goes_on_beyond_the_budget(planner, monkeypatch)
     """Until the time is over, by a clock that goes on with each look at it."""
     looks = itertools.count()
     monkeypatch.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda: next(looks) / 10_000)
-    result = plan(hard_to_reach(), settings(planner, samples=200, planning_time=0.5))
-    assert_refused(result, Status.TIMEOUT, "planning_time 0.5 s", "allow more time")
+    result = plan(hard_to_reach(), settings(planner, samples=200, planning_time=0.2))
+    assert_refused(result, Status.TIMEOUT, "planning_time 0.2 s", "allow more time")
     assert result.samples > 200
     assert f"{result.samples} samples drawn" in result.message
 

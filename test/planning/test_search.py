@@ -190,6 +190,7 @@ def test_a_cancelled_plan_is_had_again_by_its_file(planner, asked, problems, mon
     assert again.samples == result.samples
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_a_plan_that_ran_out_of_time_is_had_again_by_its_file(problems, monkeypatch):
     for limit in (0.1, 0.2):
@@ -217,6 +218,7 @@ def street(width=0.6):
     return Problem(GridMap(data, 0.1), Vehicle(0.3, 0.2), (1.0, 1.8, 0.0), (8.5, 8.2, 0.0))
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_a_narrow_street_is_solved_by_every_seed():
     """Where the plain algorithm, with as many samples, mostly fails."""
