@@ -1,7 +1,10 @@
 """Plan to a goal and have Nav2's controller drive there: follow_path.py X Y YAW. Ctrl-C stops the robot."""
 
 import math
+import signal
 import sys
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -12,6 +15,9 @@ from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import Header
+
+#: Set by Ctrl-C. An exception could come between a goal that was sent and the answer by which it is cancelled.
+INTERRUPTED = threading.Event()
 
 
 class Failure(Exception):
@@ -25,22 +31,23 @@ class Action:
         self._node, self._name, self._client = node, name, ActionClient(node, kind, name)
 
     def result(self, goal: Any, on_feedback: Any = None) -> Any:
-        """Return the result of a goal; a KeyboardInterrupt cancels it first.
+        """Return the result of a goal, which Ctrl-C cancels.
 
         Raises:
             Failure: no server is there, or it rejected, aborted or cancelled the goal.
         """
         if not self._client.wait_for_server(timeout_sec=10.0):
             raise Failure(f"nobody serves {self._name}")
+        if INTERRUPTED.is_set():
+            raise Failure(f"{self._name} was cancelled")
         handle = self._answer(self._client.send_goal_async(goal, feedback_callback=on_feedback))
         if not handle.accepted:
             raise Failure(f"{self._name} rejected the goal")
         ended = handle.get_result_async()
-        try:
-            response = self._answer(ended)
-        except KeyboardInterrupt:
+        self._spin(lambda: ended.done() or INTERRUPTED.is_set())
+        if not ended.done():
             self._answer(handle.cancel_goal_async())
-            response = self._answer(ended)
+        response = self._answer(ended)
         if response.status == GoalStatus.STATUS_CANCELED:
             raise Failure(f"{self._name} was cancelled")
         if response.status != GoalStatus.STATUS_SUCCEEDED:
@@ -48,8 +55,12 @@ class Action:
         return response.result
 
     def _answer(self, future: Any) -> Any:
-        rclpy.spin_until_future_complete(self._node, future)
+        self._spin(future.done)
         return future.result()
+
+    def _spin(self, is_over: Callable[[], bool]) -> None:
+        while not is_over():
+            rclpy.spin_once(self._node, timeout_sec=0.1)
 
 
 def drive(node: Node, x: float, y: float, yaw: float) -> None:
@@ -64,10 +75,17 @@ def drive(node: Node, x: float, y: float, yaw: float) -> None:
     print("arrived", flush=True)
 
 
+def interrupt(*_: Any) -> None:
+    """Have the goal cancelled; the next Ctrl-C ends the program whoever does not answer."""
+    INTERRUPTED.set()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def main() -> int:
     """Drive to the goal of the command line; return the exit status."""
     goal = map(float, remove_ros_args(sys.argv)[1:])
     # Ctrl-C is ours: the goal is to be cancelled first, for which ROS is needed.
+    signal.signal(signal.SIGINT, interrupt)
     rclpy.init(args=sys.argv, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     try:
         drive(rclpy.create_node("follow_path"), *goal)

@@ -4,6 +4,7 @@ import threading
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
+from ..planning.text import quoted_name
 from .rigid import IDENTITY, Rigid
 
 #: Time for which transforms are kept, before the newest of each frame [ns].
@@ -55,8 +56,8 @@ class _Frame:
         if not self.stamps[0] <= stamp <= self.stamps[-1]:
             is_past = stamp < self.stamps[0]
             end, which = (self.stamps[0], "before the oldest") if is_past else (self.stamps[-1], "after the newest")
-            raise TransformUnknown(f"the time asked for is {abs(stamp - end) / 1e9:.3f} s {which} transform from '{self.parent}' "
-                                   f"to '{name}'", is_final=is_past)
+            raise TransformUnknown(f"the time asked for is {abs(stamp - end) / 1e9:.3f} s {which} transform from "
+                                   f"{quoted_name(self.parent)} to {quoted_name(name)}", is_final=is_past)
         after = bisect_left(self.stamps, stamp)
         if self.stamps[after] == stamp:
             return self.poses[after]
@@ -117,8 +118,8 @@ class TransformBuffer:
         if up[-1] != down[-1]:
             known = {*self._frames, *(frame.parent for frame in self._frames.values())}
             missing = [name for name in (source, target) if name not in known]
-            raise TransformUnknown(f"there is no frame '{missing[0]}' yet" if missing else
-                                   f"no transforms join '{source}' and '{target}'")
+            raise TransformUnknown(f"there is no frame {quoted_name(missing[0])} yet" if missing else
+                                   f"no transforms join {quoted_name(source)} and {quoted_name(target)}")
         while up and down and up[-1] == down[-1]:
             up.pop()
             down.pop()
@@ -130,6 +131,6 @@ class TransformBuffer:
         while names[-1] in self._frames:
             parent = self._frames[names[-1]].parent
             if parent in names:
-                raise TransformUnknown(f"'{name}' is its own ancestor")
+                raise TransformUnknown(f"{quoted_name(name)} is its own ancestor")
             names.append(parent)
         return names

@@ -104,10 +104,12 @@ def test_a_path_is_handed_to_the_controller(follower, way, status, says):
 
 
 @needs_messages
-def test_ctrl_c_stops_the_robot(follower):
-    command = [sys.executable, "-u", EXAMPLES / "follow_path.py", *numbers(GOAL), *follower("wait")]
+@pytest.mark.parametrize(("way", "at"), [("wait", "to go"), ("late", "Path of ")])
+def test_ctrl_c_stops_the_robot(follower, way, at):
+    """Also one that has yet to accept the path."""
+    command = [sys.executable, "-u", EXAMPLES / "follow_path.py", *numbers(GOAL), *follower(way)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        while "to go" not in process.stdout.readline():
+        while at not in process.stdout.readline():
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=DEADLINE)

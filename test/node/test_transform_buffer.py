@@ -130,6 +130,13 @@ def test_what_is_missing_is_named(buffer, target, source, words):
     assert not unknown.value.is_final
 
 
+def test_of_a_long_name_the_middle_is_left_out(buffer):
+    buffer.add("map", "base", SECOND, shifted(1), is_static=False)
+    with pytest.raises(TransformUnknown) as unknown:
+        buffer.lookup("map", "x" * 1000)
+    assert len(str(unknown.value)) < 300
+
+
 def test_frames_that_go_round_in_a_circle_are_refused_and_end(buffer):
     buffer.add("a", "b", SECOND, shifted(1), is_static=False)
     buffer.add("b", "a", SECOND, shifted(1), is_static=False)

@@ -1,10 +1,12 @@
-"""A small FollowPath server, a process of its own: `follower.py NAMESPACE drive|reject|abort|wait`.
+"""A small FollowPath server, a process of its own: `follower.py NAMESPACE drive|reject|abort|wait|late`.
 
-It drives along the path a pose at a time, rejects the goal, aborts it half way, or waits until it is cancelled.
+It drives along the path a pose at a time, rejects the goal, aborts it half way, or waits until it is cancelled; late,
+it takes its time to accept it, too.
 """
 
 import math
 import sys
+import time
 from itertools import pairwise
 
 import rclpy
@@ -29,6 +31,8 @@ class Follower:
         ticked.set_result(None)
 
     def _on_goal(self, goal):
+        if self._way == "late":
+            time.sleep(0.5)
         usable = goal.path.poses and goal.controller_id == "FollowPath"
         return GoalResponse.ACCEPT if usable and self._way != "reject" else GoalResponse.REJECT
 
@@ -39,7 +43,7 @@ class Follower:
             await self._ticked
             left -= math.dist(here, there)
             handle.publish_feedback(FollowPath.Feedback(distance_to_goal=left, speed=0.5))
-            while self._way == "wait" and not handle.is_cancel_requested:
+            while self._way in ("wait", "late") and not handle.is_cancel_requested:
                 await self._ticked
             if handle.is_cancel_requested:
                 handle.canceled()
