@@ -8,6 +8,7 @@ import sys
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import uninstall_signal_handlers
 from rclpy.utilities import remove_ros_args
 
 from dubins_rrt_ros.planning import MapError, OptionError
@@ -53,6 +54,8 @@ def _run(arguments: list[str]) -> int:
         # A second signal must not interrupt the shutdown.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        # Waits for the thread in which rclpy acts on signals: it uses what executors destroy when they are shut down.
+        uninstall_signal_handlers()
         if node is not None:
             node.close()
         if executor is not None:
