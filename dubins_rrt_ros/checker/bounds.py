@@ -31,6 +31,8 @@ LEFT, RIGHT = 1, -1
 PAIRS = 200_000
 #: Number of times that boxes are halved at most where the bound of the whole is not enough, and greatest number of their pairs.
 HALVINGS, MAX_PAIRS = 14, 20_000
+#: What a bound may fall short of the curve between the boxes' middles, in turning radii; a smaller share takes more halvings.
+SHORT = 1e-3
 
 
 def too_high(ahead: np.ndarray, boxes: np.ndarray, radius: float, margin: float) -> np.ndarray:
@@ -54,14 +56,26 @@ def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray
     """Return lower bounds of the curves from each of (n, 8) boxes to the box of the same row, at most `enough` (n,) [m]."""
     least, row = enough.copy(), np.arange(len(a))
     for halving in range(HALVINGS + 1):
-        found = _least_of_whole(a, b, radius, enough[row])
-        short = np.flatnonzero(found < enough[row])
+        found = _least_of_whole(a, b, radius, least[row])
+        short = np.flatnonzero(found < least[row])
+        # No more can be shown than for the poses in the middle: a little less is enough where that is too short.
+        middles = _least_of_whole(_middle(a[short]), _middle(b[short]), radius, least[row[short]])
+        less = np.maximum(middles - SHORT * radius, found[short])
+        np.minimum.at(least, row[short], np.where(middles < least[row[short]], less, np.inf))
+        short = short[found[short] < least[row[short]]]
         if halving == HALVINGS or len(short) > MAX_PAIRS:
-            np.minimum.at(least, row, found)
+            np.minimum.at(least, row[short], found[short])
         if halving == HALVINGS or not 0 < len(short) <= MAX_PAIRS:
             break
         (a, b), row = _halves(a[short], b[short], radius), np.tile(row[short], 2)
     return least
+
+
+def _middle(boxes: np.ndarray) -> np.ndarray:
+    """Return the poses in the middles of boxes, as boxes."""
+    boxes = boxes.copy()
+    boxes[:, (4, 5, 7)] = 0
+    return boxes
 
 
 def _halves(a: np.ndarray, b: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:

@@ -19,6 +19,8 @@ END, SAGITTA = 1e-6, 1e-6
 MARGIN = 1e-11
 #: Greatest range of headings [rad] of the boxes into which those of the goal are cut, and greatest number of boxes across it.
 GOAL_TURN, GOAL_PARTS = 0.1, 8
+#: Number of times that a square is halved at most, both ways, to show that the vehicle's disc cannot be there.
+SQUARE_HALVINGS = 12
 
 
 #: The cells before and after a crossing of a level; and the boxes of each.
@@ -133,6 +135,7 @@ class _Bound:
         grid = document["squares"]
         x, y = map(float, grid["corner"])
         place = (x, y), float(grid["side"])
+        _demand(place[1] > 0, "the squares have no size")
         self._levels = np.array(document["levels"], dtype=float)
         self._squares = Squares(*place, np.array(document["from_start"], dtype=float), self._levels)
         self._to_goal = Squares(*place, np.array(document["to_goal"], dtype=float), self._levels[:0])
@@ -192,16 +195,17 @@ class _Bound:
 
     def _check_blocked(self, some: np.ndarray) -> None:
         """Show that squares hold no place where the inscribed disc may be: the middle of each part is too near to an obstacle."""
-        side, parts = self._squares.side, int(self._document["squares"]["parts"])
-        _demand(side > 0 and parts > 0, "the squares have no size")
         row, column = np.divmod(some, self._squares.columns)
-        shares = (np.arange(parts) + 0.5) / parts
-        x = self._squares.corner[0] + side * (column[:, None, None] + shares)
-        y = self._squares.corner[1] + side * (row[:, None, None] + shares[:, None])
-        points = np.stack(np.broadcast_arrays(x, y), axis=-1).reshape(-1, 2)
-        room = self._world.clearances(points, self._inner) + side / parts * math.sqrt(0.5) + self._margin
-        place = points[room.argmax()].round(3).tolist() if len(room) else []
-        _demand(np.all(room < self._inner), f"the vehicle may be outside of all squares, at {place}")
+        half = self._squares.side / 2
+        points = np.array(self._squares.corner) + half * np.column_stack([2 * column + 1, 2 * row + 1])
+        for _ in range(SQUARE_HALVINGS):
+            room = self._world.clearances(points, self._inner) + self._margin
+            place = points[room.argmax()].round(3).tolist() if len(room) else []
+            _demand(np.all(room < self._inner), f"the vehicle may be outside of all squares, at {place}")
+            points = points[room + half * math.sqrt(2) >= self._inner]
+            half /= 2
+            points = (points[:, None] + half * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])).reshape(-1, 2)
+        _demand(not len(points), "the vehicle may be outside of all squares")
 
     def _find_cells(self, corridor: np.ndarray) -> None:
         """Take the cell of each part of a square in a slab from the certificate, and show that parts that meet have the same."""

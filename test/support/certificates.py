@@ -1,40 +1,67 @@
-"""Certificates of small problems, and claims made false, for the tests of the checker and for `test/checker/spoil.py`."""
+"""Certificates of small problems, planned or recorded, for the tests of the checker and for `test/checker/spoil.py`."""
 
-import copy
+import gzip
+import json
 import math
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from dubins_rrt_ros.checker.maps import read_map
+from dubins_rrt_ros.checker.check import Refused, check
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan, save_map
-from dubins_rrt_ros.planning.certificate.certificate import certify, checked_map
+from dubins_rrt_ros.planning.certificate.certificate import certify, checked_map, write_certificate
 from support.cases import boxes_grid, maze_grid
 
-#: A path is planned with so many samples, and proved to be so near to the shortest.
+#: A path is planned with so many samples.
 SETTINGS = Settings(samples=300, seed=1, preferred_clearance=0.0, planning_time=1.0)
+RECORDED = Path(__file__).resolve().parents[1] / "checker" / "recorded"
 
 
-class Certified(NamedTuple):
-    """A certificate with its map."""
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A certificate with the file of its map."""
 
     document: dict
-    grid: GridMap
-    path: object
     file: Path
 
 
-def certified(grid, vehicle, start, goal, folder, gap=0.05, seconds=20.0, **request):
-    """Plan on a grid that is written to a folder; None where there is no path."""
-    folder.mkdir(parents=True, exist_ok=True)
-    save_map(grid, folder / "map.yaml")
-    problem = Problem(grid, vehicle, start, goal, **request)
-    answer = plan(problem, SETTINGS)
+def certified(problem, map_file, gap=0.05, seconds=20.0, settings=SETTINGS):
+    """Plan and prove; None where there is no path."""
+    answer = plan(problem, settings)
     if answer.path is None:
         return None
-    document = certify(problem, answer.path, checked_map(problem, folder / "map.yaml"), gap, seconds)
-    return Certified(document, grid, answer.path, folder / "map.yaml")
+    return Certified(certify(problem, answer.path, checked_map(problem, map_file), gap, seconds), map_file)
+
+
+def saved(grid, folder):
+    """A grid's map file in a folder, which is made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_map(grid, folder / "map.yaml")
+    return folder / "map.yaml"
+
+
+@cache
+def recorded(name):
+    """A recorded certificate, with the file of its map; `test/checker/record.py` made them."""
+    file = next(file for file in RECORDED.glob(f"{name}.*") if file.suffix in (".yaml", ".geojson"))
+    return Certified(json.loads(gzip.decompress((RECORDED / f"{name}.cert").read_bytes())), file)
+
+
+def recorded_names():
+    """The names of what is recorded."""
+    return sorted(file.stem for file in RECORDED.glob("*.cert"))
+
+
+def refusal(certified, folder):
+    """The checker's sentence about a document, "" where it holds."""
+    write_certificate(folder / "path.cert", certified.document)
+    try:
+        check(folder / "path.cert", certified.file)
+    except Refused as refused:
+        return str(refused)
+    return ""
 
 
 def hall():
@@ -44,107 +71,17 @@ def hall():
     return GridMap(data, 0.1, (3.0, -2.0, 0.4), "hall")
 
 
-def hall_pose(x, y, yaw):
-    """A pose in the hall by its place in the grid's own frame."""
-    grid = hall()
+def pose_in(grid, x, y, yaw):
+    """A pose of a grid by its place in the grid's own frame."""
     return (*grid.to_map_frame(np.array([x, y])).tolist(), yaw + grid.origin[2])
 
 
 def random_certified(rng, folder):
-    """The certificate of a random small problem; None where there is no path."""
-    grid = (boxes_grid, maze_grid)[rng.integers(2)](rng, side=24)
-    vehicle = Vehicle(turning_radius=float(rng.uniform(0.3, 1.2)), robot_radius=float(rng.uniform(0.15, 0.4)))
-    side = 24 * grid.resolution
-    places = rng.uniform(0.1 * side, 0.9 * side, (2, 2))
-    start, goal = ((*grid.to_map_frame(place).tolist(), float(rng.uniform(-math.pi, math.pi))) for place in places)
+    """The certificate of a random small problem, mostly of up to sixty boxes; None where there is no path."""
+    grid = (boxes_grid, maze_grid)[rng.integers(2)](rng, side=18)
+    vehicle = Vehicle(turning_radius=float(rng.uniform(0.3, 1.0)), robot_radius=float(rng.uniform(0.15, 0.4)))
+    side = 18 * grid.resolution
+    start, goal = (pose_in(grid, *rng.uniform(0.1 * side, 0.9 * side, 2), float(rng.uniform(-math.pi, math.pi)))
+                   for _ in range(2))
     request = [{}, {}, {"goal_tolerance_xy": 0.2, "goal_tolerance_yaw": 0.3}, {"any_goal_heading": True}][rng.integers(4)]
-    return certified(grid, vehicle, start, goal, folder, gap=0.05, seconds=2.0, **request)
-
-
-def written(certified, document, folder, data=None):
-    """Write a map with other cells, and let a document be for it; return the map's file."""
-    grid = certified.grid
-    folder.mkdir(parents=True, exist_ok=True)
-    save_map(GridMap(grid.data if data is None else data, grid.resolution, grid.origin, percent=True), folder / "map.yaml")
-    document["map"] = read_map(folder / "map.yaml", False).description | {"allow_unknown": False}
-    return folder / "map.yaml"
-
-
-def _raised_bound(certified, document, rng):
-    document["bound"] *= 1.0001
-    document["limit"] *= 1.0001
-
-
-def _bound_above_the_path(certified, document, rng):
-    document["bound"] = 1.0001 * document["length"]
-    document["limit"] *= 1.1
-
-
-def _raised_potential(certified, document, rng):
-    level = document["boxes"][rng.integers(len(document["boxes"]))][2]
-    for row in document["boxes"]:
-        if row[2] == level and row[8] is not None:
-            row[8] += 0.001 * document["bound"]
-
-
-def _dropped_box(certified, document, rng):
-    del document["boxes"][rng.integers(len(document["boxes"]))]
-
-
-def _leak(certified, document, rng):
-    free = document["squares"]["free"]
-    row = document["boxes"][rng.integers(len(document["boxes"]))]
-    up, across = divmod(int(row[0]), len(free[0]))
-    free[up] = free[up][:across] + "0" + free[up][across + 1:]
-
-
-def _swapped_levels(certified, document, rng):
-    levels = document["levels"]
-    levels[0], levels[-1] = levels[-1], levels[0]
-
-
-def _wider(certified, document, rng):
-    document["request"]["turning_radius"] *= 1.001
-
-
-def _steeper(certified, document, rng):
-    document["from_start"] = [[None if cost is None else 1.01 * cost for cost in row] for row in document["from_start"]]
-
-
-#: What makes a claim false, by name.
-SPOILS = {"bound above the path": _bound_above_the_path, "bound + 0.01 %": _raised_bound,
-          "a potential raised": _raised_potential, "a box dropped": _dropped_box,
-          "a square left out": _leak, "two levels swapped": _swapped_levels, "R + 0.1 %": _wider, "costs too steep": _steeper}
-#: Spoils that can leave a claim true.
-MAY_HOLD = ("bound + 0.01 %", "a potential raised", "a box dropped", "a square left out", "walls removed", "R + 0.1 %")
-
-
-def spoiled(certified, name, rng):
-    """A copy of a certificate's document with a false claim."""
-    document = copy.deepcopy(certified.document)
-    SPOILS[name](certified, document, rng)
-    return document
-
-
-def too_near(certified):
-    """A copy for a vehicle that comes 2 mm too near to an obstacle."""
-    document = copy.deepcopy(certified.document)
-    world = read_map(certified.file, False)
-    points = np.array([world.own(pose)[:2] for pose in certified.path.poses(0.01)])
-    document["request"]["robot_radius"] = float(world.clearances(points, np.inf).min()) + 0.002
-    return document
-
-
-def walled(certified, folder):
-    """A copy for a map with a wall on the path, and its file."""
-    document, data = copy.deepcopy(certified.document), certified.grid.data.copy()
-    x, y, _ = certified.path.poses(0.01)[len(certified.path.poses(0.01)) // 2]
-    column, row = (certified.grid.to_grid_frame(np.array([x, y])) / certified.grid.resolution).astype(int)
-    data[row, column] = 100
-    return document, written(certified, document, folder, data)
-
-
-def opened(certified, folder):
-    """A copy for a map without obstacles, and its file."""
-    document = copy.deepcopy(certified.document)
-    return document, written(certified, document, folder, np.zeros_like(certified.grid.data))
+    return certified(Problem(grid, vehicle, start, goal, **request), saved(grid, folder), gap=0.1, seconds=0.2)

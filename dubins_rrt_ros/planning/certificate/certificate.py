@@ -97,7 +97,7 @@ def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str,
     box = pose_box(*start, 0.0, 0.0, 0.0, math.nan)
     bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
     return {"bound": max(0.0, bound), "limit": length, "levels": [], "cells": [], "boxes": [],
-            "squares": {"corner": [0, 0], "side": 1, "parts": 1, "free": []}, "from_start": [], "to_goal": []}
+            "squares": {"corner": [0, 0], "side": 1, "free": []}, "from_start": [], "to_goal": []}
 
 
 def _claim(problem: Problem, path: Path, world: CheckedMap) -> dict[str, Any]:
@@ -128,7 +128,7 @@ class _Draft:
             levels = np.where(np.isin(levels, from_start), np.nextafter(levels, 0), levels)
         self._squares = Squares((-side, -side), side, from_start, levels)
         self._to_goal = Squares((-side, -side), side, to_goal, levels[:0])
-        self._free, self._parts = free, 2 * sets.cells
+        self._free = free
         domain = np.flatnonzero(free)
         least = sum(squares.corners(domain).min(axis=(1, 2)) for squares in (self._squares, self._to_goal))
         self._limit = self._length * (1 + 1e-6) + 2 * side
@@ -143,8 +143,11 @@ class _Draft:
         """
         cover, radius = self._cover(), float(self._request["turning_radius"])
         bisection, boxes = Bisection(cover, radius), None
-        targets = (self._length / (1 + share) * (1 + SLACK) for share in (*(share for share in GAPS if share > gap), gap))
+        # Further ones than that of the gap, as the checker's bounds of curves are lower than those by which boxes are halved.
+        targets = sorted(self._length / (1 + share) * (1 + SLACK) for share in (*GAPS, gap))
         for target in (target for target in targets if target > bound):
+            if self._length <= (1 + gap) * bound:
+                break
             bisection.run(target, is_over)
             try:
                 potentials = Potentials(cover, radius, bisection.bound, is_over)
@@ -156,7 +159,7 @@ class _Draft:
                 break
         return None if boxes is None else {
             "bound": bound, "limit": self._limit,
-            "squares": {"corner": list(self._squares.corner), "side": self._squares.side, "parts": self._parts,
+            "squares": {"corner": list(self._squares.corner), "side": self._squares.side,
                         "free": ["".join("01"[is_free] for is_free in row) for row in self._free.tolist()]},
             "from_start": _rows(self._squares.costs), "to_goal": _rows(self._to_goal.costs),
             "levels": self._squares.levels.tolist(), "cells": self._cells.of_squares(), "boxes": boxes}

@@ -89,11 +89,6 @@ class LevelSets:
         """Side of a square [m]."""
         return float(self._from_start.kernel.side)
 
-    @property
-    def cells(self) -> int:
-        """Number of the raster's cells along the side of a square."""
-        return round(self.side / float(self._field.kernel.resolution))
-
     def costs(self, points: np.ndarray) -> np.ndarray:
         """Return the (n,) costs from the start at (n, 2) points [m]; infinite where there is no way."""
         return self._from_start.at(points)
