@@ -111,7 +111,7 @@ def test_a_frame_from_outside_is_told_quoted_on_one_line_and_cut(talk, frame):
         assert_says(told, "202", "TF_ERROR", f"The {name} pose is in frame '", "'map'")
         assert told["message"].isprintable() and len(told["message"]) < 600
     lines = talk.process.output[said:].splitlines()
-    assert [line for line in lines if not line.isprintable() or line.startswith("[ERROR] [1.0]") or len(line) > 700] == []
+    assert [line for line in lines if not line.isprintable() or line.startswith("[ERROR] [1.0]") or len(line) > 800] == []
 
 
 @pytest.mark.parametrize("pose", [
