@@ -90,14 +90,19 @@ class Floor:
     def walk(self, seconds: float, cars: list[np.ndarray]) -> None:
         """Let people walk on; they turn at walls, and away from cars."""
         for person in self.people:
-            x, y = person[:2] + seconds * person[2:]
-            near = [car for car in cars if math.dist(car[:2], (x, y)) < SHY]
-            if near or self.room(x, y) < 0.35 or not person[2:].any():
+            near = [car for car in cars if math.dist(car[:2], person[:2]) < SHY]
+            if not self._step(person, seconds, near) or not person[2:].any():
                 away = math.atan2(*(person[:2] - near[0][:2])[::-1]) if near else self.rng.uniform(-math.pi, math.pi)
                 angle = away + self.rng.uniform(-1.0, 1.0)
                 person[2:] = WALK * math.cos(angle), WALK * math.sin(angle)
-            else:
-                person[:2] = x, y
+
+    def _step(self, person: np.ndarray, seconds: float, near: list[np.ndarray]) -> bool:
+        """Let a person take a step where no wall is, and no car comes nearer by it; return True if so."""
+        x, y = person[:2] + seconds * person[2:]
+        if self.room(x, y) < 0.35 or any(math.dist(car[:2], (x, y)) < math.dist(car[:2], person[:2]) for car in near):
+            return False
+        person[:2] = x, y
+        return True
 
     def seen(self, car: np.ndarray, others: list[np.ndarray]) -> GridMap:
         """Return the map as a car has it: walls, people and other cars in sight, and wrong cells."""
@@ -105,7 +110,8 @@ class Floor:
         height, width = cells.shape
         x = self.grid.origin[0] + (np.arange(width) + 0.5) * self.grid.resolution
         y = self.grid.origin[1] + (np.arange(height) + 0.5) * self.grid.resolution
-        discs = [(*person[:2], PERSON) for person in self.people] + [(*other[:2], BODY) for other in others]
+        reach = self.grid.resolution * math.sqrt(0.5)  # to whose middle a cell that is touched reaches
+        discs = [(*person[:2], PERSON + reach) for person in self.people] + [(*other[:2], BODY + reach) for other in others]
         for px, py, radius in discs:
             if math.dist((px, py), car[:2]) < SIGHT:
                 cells[np.hypot(x[None, :] - px, y[:, None] - py) < radius] = 100
