@@ -12,6 +12,7 @@ from .result import gap_above
 from .search.cost import minimises_length
 from .search.tree import Tree
 from .settings import Settings
+from .work import NO_WORK, WorkDone
 
 #: What may find a path, by the values of `Plan.found_by`.
 ALGORITHMS = {"hybrid_astar": "hybrid A*", "rrt": "RRT", "rrt_star": "RRT*", "seed_path": "the seed path"}
@@ -27,6 +28,7 @@ class AuditedPath:
         cost: the cost of the path [m].
         found: the best path of the search, of which this one is a simpler form, or the same.
         is_simple: False where the path was not simplified, since the first one is not to wait for that.
+        work: where the work that made it ended.
     """
 
     path: Path
@@ -37,6 +39,7 @@ class AuditedPath:
     cost: float = 0.0
     found: Path | None = None
     is_simple: bool = True
+    work: WorkDone = NO_WORK
 
     def improves(self, other: "AuditedPath | None") -> bool:
         """Return True if this is worth a report after the other."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from dubins_rrt_ros import __version__
@@ -17,6 +18,7 @@ from .result import Plan
 from .settings import MAX_PLANNING_TIME, Settings
 from .text import quoted, quoted_name
 from .vehicle import Vehicle
+from .work import WorkDone
 
 #: Settings that a document of an earlier version lacks, as that version planned.
 BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0, "cost_weight": 0.0}
@@ -49,6 +51,7 @@ def to_document(plan: Plan, map_name: str) -> dict[str, Any]:
         "cost_gap": _number(plan.cost_gap), "roomy_share": _number(plan.roomy_share),
         "min_clearance": _number(plan.min_clearance),
         "max_curvature": _number(plan.max_curvature), "audit": str(plan.audit or ""),
+        "work": plan.work and list(plan.work),
         "curves": [_curve_document(curve) for curve in path.curves] if path else [],
         "poses": plan.poses().tolist(),
         **_waypoints_document(plan), **_hooks_document(plan),
@@ -84,9 +87,9 @@ def read_request(document: Mapping[str, Any], world_map: Map, *, is_free: IsFree
                  ) -> tuple[Problem, Settings]:
     """Return the request that a document answers, for planning it again on a map.
 
-    The time limit is lifted to the largest allowed, and the sample budget is what was drawn: a deadline and a
-    cancellation only cut the sequence of samples short, so the same number of them gives the same path on a machine of
-    any speed. So does a proof, which is not made again. Where nothing was drawn, the budget stays as it was.
+    The time limit is lifted to the largest allowed, and the work ends where it ended: a deadline, a cancellation and a proof,
+    which is not made again, only cut it short, so that the path is the same on a machine of any speed. Over waypoints, and
+    where a document of an earlier version tells no work, the samples that were drawn are the budget.
 
     Args:
         is_free, sampler: the functions that the plan was made with; a document has their names alone.
@@ -105,9 +108,17 @@ def read_request(document: Mapping[str, Any], world_map: Map, *, is_free: IsFree
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
     problem = Problem(world_map, vehicle, start, goal, **request, is_free=is_free)
     fields = _known(Settings, BEFORE | fields, "settings")
+    settings = Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "stop_gap": 0.0, "sampler": sampler})
     drawn = _field(document, "samples", int)
-    return problem, Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "samples": drawn or fields["samples"],
-                                          "stop_gap": 0.0, "sampler": sampler})
+    if document.get("work") is not None:
+        return problem, replace(settings, work_limits=_work(document["work"]))
+    return problem, replace(settings, samples=drawn or settings.samples)
+
+
+def _work(units: Any) -> WorkDone:
+    if not (isinstance(units, list) and len(units) == 3 and all(type(count) is int and count >= 0 for count in units)):
+        raise PlanFileError(f"work holds {quoted(units)} where three numbers of units are due")
+    return WorkDone(*units)
 
 
 def read_waypoints(document: Mapping[str, Any]) -> tuple[Waypoint, ...]:

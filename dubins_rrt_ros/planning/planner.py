@@ -27,6 +27,7 @@ from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
 from .settings import Settings
+from .work import Work, WorkDone
 from .world import World, problem_with_costs, world_of
 
 #: Maximum time between two reports of progress [s].
@@ -180,8 +181,7 @@ class _Call:
             self._report(search)
             if self._proof and self._best:
                 self._proof.follow(self._best.path, search.length_bounds, bool(search.bound) or not self._settings.informed)
-            deadline.poll()
-            if deadline.is_over or (may_end and (deadline.is_due or self._is_proved(search))):
+            if search.work.is_over or (may_end and (deadline.is_due or self._is_proved(search))):
                 break
         return self._end_of(search, field)
 
@@ -246,23 +246,25 @@ class _Call:
 
     def _audited(self, path: Path, search: Search, simplify: bool = True, is_last: bool = False) -> AuditedPath:
         """Simplify and audit a path once: an improvement that was reported is often the answer too."""
-        simple = path
+        simple, simplified, merging = path, 0, Work(self._deadline.poll, self._settings.work_limits.merging)
         if simplify and not search.objective.is_length:
             known = self._best if self._best and self._best.is_simple and self._best.found == path else None
-            simple = known.path if known else self._simplified(path, search)
+            simple, simplified = (known.path, known.work.simplification) if known else self._simplified(path, search)
         if is_last:
-            simple = search.without_short_arcs(simple)
+            simple = search.without_short_arcs(simple, merging)
         self._found_cost = search.cost
         return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
-                        search.objective.path_cost(simple), path, simplify or search.objective.is_length)
+                        search.objective.path_cost(simple), path, simplify or search.objective.is_length,
+                           WorkDone(search.work.done, simplified, merging.done))
 
-    def _simplified(self, path: Path, search: Search) -> Path:
-        """Return a simpler form of a path, for which there is time kept once it is known how long that takes."""
+    def _simplified(self, path: Path, search: Search) -> tuple[Path, int]:
+        """Return a simpler form of a path, and the work of it; time is kept for that once it is known how long it takes."""
+        work = Work(self._deadline.poll, self._settings.work_limits.simplification)
         self._deadline.reserve = AUDIT_RESERVE * self._audit_took
         began = self._elapsed
-        simple = search.simplified(path)
+        simple = search.simplified(path, work)
         self._simplifying_took = self._elapsed - began
-        return simple
+        return simple, work.done
 
     def _audit(self, path: Path) -> Audit:
         """Audit a path, unless that was done last."""
@@ -361,7 +363,8 @@ class _Call:
             why, location = "with goal_bias 0 the goal itself is never drawn, so set it above 0, or the goal's tolerances", None
         if self._own_test:
             why += f"; is_free was asked {self._own_test.asked} times and refused {self._own_test.refused}"
-        return self._plan(Status.TIMEOUT, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location)
+        return self._plan(Status.TIMEOUT, f"{what}: {drawn}; {why}.", tree, samples=search.samples, location=location,
+                          work=WorkDone(search.work.done))
 
     def _trapped(self, search: Search, field: ClearanceField) -> Plan | None:
         """Return the plan without a path where no arc leaves the start or none reaches the goal, if that can be proved."""
@@ -387,7 +390,7 @@ class _Call:
         message = success_message(self._problem, self._settings, best, (bound, cost_bound), elapsed, cancelled=cancelled,
                                   running=running, proved=proved)
         return self._plan(Status.NONE, message, best.tree, path=best.path, samples=best.samples, cancelled=cancelled,
-                          audit=best.audit, found_by=best.found_by, lower_bound=bound, cost=best.cost,
+                          audit=best.audit, found_by=best.found_by, work=best.work, lower_bound=bound, cost=best.cost,
                           cost_lower_bound=cost_bound, planning_time=elapsed,
                           roomy_share=self._objective.roomy_share(best.path) if self._objective else None)
 

@@ -19,6 +19,7 @@ from .problem import Pose, Problem, Waypoint
 from .search.tree import Tree
 from .settings import Settings
 from .vehicle import Point
+from .work import WorkDone
 from .world import World
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ class Plan(Plottable):
         found_by: what found the path, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one, and
             where nothing had to be searched.
         audit: the audit of the path, or of one that was found and failed it; None where there was nothing to audit.
+        work: where the work ended, so that it can be done again; None where nothing was searched, and over waypoints.
         start_too_near: True if the path leaves a start that is nearer to an obstacle than allowed, as `start_slack` says.
         waypoints: the waypoints that the path was to pass, as they were asked for.
         waypoint_indices: index among `poses` of each waypoint; empty without a path.
@@ -96,6 +98,7 @@ class Plan(Plottable):
     roomy_share: float | None = None
     found_by: str = ""
     audit: Audit | None = None
+    work: WorkDone | None = None
     start_too_near: bool = False
     waypoints: tuple[Waypoint, ...] = ()
     waypoint_indices: tuple[int, ...] = ()

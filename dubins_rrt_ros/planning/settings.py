@@ -6,6 +6,7 @@ from typing import Any
 from .hooks import Sampler, check_function
 from .option import OptionError, convert_options, documented, option
 from .vehicle import Vehicle
+from .work import UNLIMITED_WORK, WorkDone
 
 #: Maximum planning_time [s].
 MAX_PLANNING_TIME = 3600.0
@@ -27,6 +28,7 @@ class Settings:
     Attributes:
         sampler: a function of yours that draws the samples, or None: `sampler(rng, n)` gives (n, 3) poses. The share `goal_bias`
             of them is at the goal all the same. It is no option: files and the node do not know it.
+        work_limits: where a plan ended that is to be made again, as its `work` tells; no option either.
 
     Raises:
         HookError: the sampler is no function.
@@ -63,6 +65,7 @@ class Settings:
                                 "no longer; without effect on one core, with informed: false, and for rrt")
     seed: int = option(-1, "seed of the random samples; -1 draws a fresh one, which is reported", low=-1, high=2**31 - 1)
     sampler: Sampler | None = field(default=None)
+    work_limits: WorkDone = field(default=UNLIMITED_WORK)
 
     def __post_init__(self) -> None:
         convert_options(self)

@@ -35,6 +35,7 @@ from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
 from .stops import HEADINGS, Stop, legs_along, passing_indices, stops_of
+from .work import Work
 from .world import problem_with_costs, world_of
 
 #: Number of headings at either end with which a leg between obstacles is planned first.
@@ -221,11 +222,11 @@ class _Call:
         runs = HybridAStarRuns(problem, self._settings, field, to_end or CostToGo.to_goal(problem, field))
         path, left = None, DRAFT_EXPANSIONS
         while path is None and left > 0 and not runs.exhausted and not self._clock.poll():
-            path, left = runs.run(STEP, math.inf, self._clock.poll), left - STEP
+            path, left = runs.run(STEP, math.inf, Work(self._clock.poll)), left - STEP
         if path is None:
             return False
         for first_round in (True, False):
-            path = smooth(path, vehicle, field, self._rng, first_round, self._clock.poll, self._objective)
+            path = smooth(path, vehicle, field, self._rng, first_round, Work(self._clock.poll), self._objective)
         self._found_by = "hybrid_astar"
         leg.add(path)
         return True
@@ -255,7 +256,7 @@ class _Call:
     def _smoothed(self, path: Path) -> Path:
         if _is_shortest(path) or self._clock.is_over:
             return path
-        return smooth(path, self._problem.vehicle, self.world.field, self._rng, False, self._clock.poll, self._objective)
+        return smooth(path, self._problem.vehicle, self.world.field, self._rng, False, Work(self._clock.poll), self._objective)
 
     def _with_best_heading(self, before: Path, after: Path, most: float) -> list[Path]:
         """Return two legs with the heading between them that makes them cheapest, of those up to `most` [rad] off the present."""

@@ -1,6 +1,7 @@
 """Plans as JSON documents: every number comes back as it was, and the request can be planned again."""
 
 import dataclasses
+import itertools
 import json
 import math
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 import shapely
 
 from dubins_rrt_ros.cli.main import main
-from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, load_map, plan, values
+from dubins_rrt_ros.planning import OptionError, PolygonMap, Problem, Settings, Vehicle, load_map, plan, prepare, values
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
 from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request, to_document
 from dubins_rrt_ros.planning.text import LONGEST
@@ -18,7 +19,7 @@ from dubins_rrt_ros.planning.text import LONGEST
 FIGURES = ("time_to_first", "time_to_found", "planning_time", "map_time", "length", "lower_bound", "gap", "cost",
            "cost_lower_bound", "cost_gap", "roomy_share", "min_clearance", "max_curvature")
 FIELDS = {"error_code", "error_name", "message", "found_by", "planner", "seed", "samples", "tree_nodes", *FIGURES,
-          "path_length", "audit",
+          "path_length", "audit", "work",
           "curves", "poses", "map", "map_id", "start", "goal", "vehicle", "settings", "version"}
 
 
@@ -75,7 +76,7 @@ def test_the_path_reads_back_bit_for_bit(answer):
 def test_the_request_reads_back_and_gives_the_same_path(answer, hall):
     problem, settings = read_request(through_json(answer), hall)
     assert problem.vehicle == answer.problem.vehicle and problem.start == answer.problem.start
-    assert settings == dataclasses.replace(answer.settings, planning_time=3600.0)
+    assert settings == dataclasses.replace(answer.settings, planning_time=3600.0, work_limits=answer.work)
     assert plan(problem, settings).path == answer.path
 
 
@@ -89,6 +90,31 @@ def test_a_search_that_was_cut_short_is_cut_at_the_same_sample(answer, hall, mon
     again = plan(problem, settings)
     assert again.samples == cut.samples
     assert again.tree.poses.tobytes() == cut.tree.poses.tobytes() and again.path == cut.path
+
+
+@pytest.mark.parametrize("options", [{}, {"preferred_clearance": 0.5}, {"step_size": 0.5}, {"informed": False, "goal_bias": 0.3}],
+                         ids=["length", "clearance", "step", "plain"])
+@pytest.mark.parametrize("footprint", [False, True], ids=["disc", "footprint"])
+def test_what_the_clock_cuts_short_is_planned_again_bit_for_bit(hall, options, footprint, monkeypatch):
+    """Wherever it does: at each look at the clock a little time has gone by, so that the time is up after so many looks."""
+    vehicle = Vehicle(0.8, footprint=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2))) if footprint else Vehicle(0.8, 0.3)
+    problem = Problem(prepare(hall, vehicle), start=(2.0, 2.0, math.pi / 2), goal=(9.0, 2.0, -math.pi / 2))
+    solved = 0
+    for seed, tick in enumerate(np.geomspace(2e-4, 2e-2, 5).tolist()):
+        with monkeypatch.context() as patched:
+            patched.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", map(tick.__mul__, itertools.count()).__next__)
+            cut = plan(problem, Settings(samples=2000, planning_time=1.0, seed=seed, **options))
+        _, settings = read_request(through_json(cut), hall)
+        again = plan(problem, settings) if cut.path else cut
+        assert again.path == cut.path and again.work == cut.work
+        solved += cut.path is not None
+    assert solved > 0
+
+
+@pytest.mark.parametrize("work", [7, [1, 2], [1, 2, -3], [1, 2, 3.0], [True, 0, 0], {}], ids=str)
+def test_work_that_is_none_is_refused(answer, hall, work):
+    with pytest.raises(PlanFileError, match="work"):
+        read_request(changed(answer, work=work), hall)
 
 
 def test_without_a_path_the_document_says_so(hall):

@@ -10,6 +10,7 @@ from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_
 
 from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, plan, prepare
 from dubins_rrt_ros.planning.search.smoothing import smooth
+from dubins_rrt_ros.planning.work import Work
 
 
 @pytest.fixture(params=["rrt", "rrt_star"])
@@ -235,6 +236,6 @@ def test_smoothing_looks_at_the_time_before_the_first_change():
         looks.append(0)
         return len(looks) > 3
 
-    smoothed = smooth(path, VEHICLE, field, np.random.default_rng(1), True, look)
+    smoothed = smooth(path, VEHICLE, field, np.random.default_rng(1), True, Work(look))
     assert 1000 < len(smoothed.words) < len(path.words)
     assert smoothed.length == pytest.approx(16.0)

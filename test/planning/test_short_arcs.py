@@ -9,6 +9,7 @@ from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
 from dubins_rrt_ros.planning.curves.path import Path
 from dubins_rrt_ros.planning.search.cost import Objective
 from dubins_rrt_ros.planning.search.short_arcs import MOST_LONGER, merge_short_arcs, short_arcs
+from dubins_rrt_ros.planning.work import Work
 
 ROOM = GridMap(np.zeros((120, 120), np.int8), 0.1)
 START = (1.0, 2.0, 0.0)
@@ -88,7 +89,7 @@ def test_paths_of_tiny_turning_radii_stay_as_they_are():
 
 def test_an_interruption_leaves_them():
     path = with_a_flick()
-    assert checked(path, Vehicle(1.0, 0.2), ROOM, interrupted=lambda: True) == path
+    assert checked(path, Vehicle(1.0, 0.2), ROOM, work=Work(lambda: True)) == path
 
 
 def test_empty_curves_are_left_out_and_the_ends_stay():

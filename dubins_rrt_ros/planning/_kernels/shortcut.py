@@ -97,11 +97,12 @@ class Shortcutter:
         self.measure_from(1)
         self.clearing = 1
 
-    def prepare(self, checks: cython.int) -> bool:
-        """Do some of what `improve` does before the first change; return True while some is left."""
+    def prepare(self, checks: cython.int) -> int:
+        """Do some of what `improve` does before the first change, for so many curves; return for how many: fewer at the end."""
+        before: cython.int = self.clearing - self.count
         with cython.nogil:
             self.clear_some(checks)
-        return self.clearing < self.count - 1
+        return self.clearing - self.count - before
 
     def improve(self, draws: cython.double[:, ::1], begin: cython.int, end: cython.int, shortcuts: cython.double):
         """Try a change for each of the rows from `begin` to `end` of (n, 6) draws, four uniform in [0, 1) and two normal.

@@ -10,13 +10,13 @@ Each is planned by hybrid A* between two poses of the path, smoothed, put into t
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from .._kernels import COMPILED
 from ..curves.path import Path
 from ..problem import Problem
+from ..work import Work
 from .cost import Objective
 from .cost_to_go import CostToGo
 from .detours import ClosedPlaces, Detour, Detours, Landscape, SaddleDetours, Searches
@@ -77,16 +77,16 @@ class Corridors:
     """The corridors that may be shorter than the best path; `next_path` tries one of them."""
 
     def __init__(self, problem: Problem, objective: Objective, from_start: CostToGo, to_goal: CostToGo, limit: float, seed: int,
-                 interrupted: Callable[[], bool], samples: int):
+                 work: Work, samples: int):
         """Find them.
 
         Args:
             from_start, to_goal: the costs, both of them bounds.
             limit: length below which a way over a saddle matters [m].
-            interrupted: called every few milliseconds; True ends a try early.
+            work: counts what is done; once it is over a try ends early.
             samples: number of samples used so far.
         """
-        self._problem, self._objective, self._interrupted = problem, objective, interrupted
+        self._problem, self._objective, self._work = problem, objective, work
         self._checker, self._edge_cost = objective.field.collision_checker(problem.vehicle), objective.edge_cost()
         self._rng = np.random.default_rng((seed, 5))  # the numbers that merge_short_arcs draws too, no others
         self._landscape = Landscape(problem, objective.field, from_start, to_goal)
@@ -159,7 +159,7 @@ class Corridors:
             search = new_search(self._problem, self._checker, self._edge_cost, arc, math.ceil(HEADINGS / arc), weight,
                                 visit_penalty, start=replaced.start, goals=replaced.waypoints[-1:], to_goal=to_goal.kernel,
                                 limit=limit, max_expanded=most)
-            expand(search, Pace(FIRST_SLICE, LARGEST_SLICE), most, self._interrupted)
+            expand(search, Pace(FIRST_SLICE, LARGEST_SLICE), most, self._work)
             if arrays := search.path():
                 waypoints, words, lengths = arrays
                 return Path(waypoints, words, lengths, vehicle.turning_radius)
@@ -168,5 +168,5 @@ class Corridors:
     def _smoothed(self, path: Path, rounds: int, is_fresh: bool = False) -> Path:
         for number in range(rounds):
             path = smooth(path, self._problem.vehicle, self._objective.field, self._rng, is_fresh and number == 0,
-                          self._interrupted, self._objective)
+                          self._work, self._objective)
         return path

@@ -17,6 +17,7 @@ from ..curves.path import Path
 from ..deadline import never
 from ..problem import Problem
 from ..settings import Settings
+from ..work import Work
 from .background import BACKGROUND, BackgroundJob
 from .cost import Objective
 from .cost_to_go import CostToGo
@@ -102,10 +103,11 @@ class HybridAStarRuns:
 
     def start(self, expansions: int, best_cost: float, interrupted: Callable[[], bool] = never) -> None:
         """Call `run` in the background; `collect` returns what it found."""
+        work = Work(interrupted)
         if self._field.own_test:  # whose function need not bear two threads
-            self._in_background = BackgroundJob(lambda: self.run(expansions, best_cost, interrupted), None)
+            self._in_background = BackgroundJob(lambda: self.run(expansions, best_cost, work), None)
         else:
-            self._in_background = BACKGROUND.start(self.run, expansions, best_cost, interrupted)
+            self._in_background = BACKGROUND.start(self.run, expansions, best_cost, work)
 
     def wait(self, seconds: float = math.inf) -> bool:
         """Wait for so long until nothing runs in the background; return True if so."""
@@ -121,19 +123,22 @@ class HybridAStarRuns:
         self._in_background = None
         return found
 
-    def run(self, expansions: int, best_cost: float, interrupted: Callable[[], bool] = never) -> Path | None:
+    def run(self, expansions: int, best_cost: float, work: Work | None = None) -> Path | None:
         """Expand that many poses.
 
         Args:
             best_cost: cost of the best path so far [m]; infinite where there is none.
-            interrupted: called every few milliseconds; True ends the portion early.
+            work: counts what is done; once it is over the portion ends early.
 
         Returns:
             A path if the run came to one. Those that cost much more than `best_cost` are not sought; others are smoothed before
             they are compared with it, where the settings allow that.
         """
+        work = work or Work()
+        if not work.begins():
+            return None
         run = self._current = self._current or self._next_run(best_cost)
-        expand(run, self._pace, expansions, interrupted)
+        expand(run, self._pace, expansions, work)
         if not run.ended:
             return None
         self._current = None
@@ -144,7 +149,7 @@ class HybridAStarRuns:
         is_first = best_cost == math.inf
         if path and not is_first and self._settings.shortcut:
             for first_round in (True, False):
-                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, interrupted, self._objective)
+                path = smooth(path, self._problem.vehicle, self._field, self._rng, first_round, work, self._objective)
         worthwhile = best_cost if self._objective.is_length else (1 - WORTHWHILE_GAIN_OF_COST) * best_cost
         self._count(path is not None and self._objective.path_cost(path) < worthwhile, is_first)
         # Not even arcs of all lengths lead anywhere from the start.
@@ -206,12 +211,13 @@ def new_search(problem: Problem, checker: CollisionChecker, edge_cost: EdgeCost,
         arc=arc * scale, turning_arc=turning_arc, sectors=headings, weight=weight, visit_penalty=visit_penalty, **options)
 
 
-def expand(search: HybridAStar, pace: Pace, expansions: int, interrupted: Callable[[], bool]) -> None:
-    """Expand that many poses, in slices after each of which `interrupted` may end it."""
-    while expansions > 0 and not search.ended and not interrupted():
-        size = min(pace.size, expansions)
+def expand(search: HybridAStar, pace: Pace, expansions: int, work: Work) -> None:
+    """Expand that many poses, in slices after each of which the work may be over."""
+    while expansions > 0 and not search.ended and not work.is_over:
+        size, before = min(work.portion(pace.size), expansions), search.expanded
         with pace.measured(size):
             search.run(size)
+        work.done += search.expanded - before + search.ended
         expansions -= size
 
 

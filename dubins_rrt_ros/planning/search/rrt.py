@@ -39,6 +39,7 @@ from ..curves.path import Path
 from ..deadline import Deadline, never
 from ..problem import Problem
 from ..settings import Settings
+from ..work import Work
 from .corridors import Corridors
 from .cost import Objective
 from .cost_bounds import CostBounds, LengthBounds
@@ -108,13 +109,14 @@ class Search:
         self.ready = False
         self._problem, self._settings, self._report_samples = problem, settings, report_samples
         self._deadline = deadline or Deadline(math.inf, never)
+        self.work = Work(self._deadline.poll, settings.work_limits.search)
         self._informed: Informed | None = None
         if settings.informed and to_goal:
             self._informed = Informed(HybridAStarRuns(problem, settings, field, to_goal),
                                       CostBounds(problem, field, to_goal, self.objective))
         self._corridors: Corridors | None = None
         self._sampler = Sampler(problem, settings, field, to_goal)
-        self._smoother = Smoother(self.objective, settings.seed, self._deadline.poll)
+        self._smoother = Smoother(self.objective, settings.seed, self.work)
 
     @property
     def samples(self) -> int:
@@ -158,15 +160,15 @@ class Search:
         """The cost of the best path so far [m]; infinite where there is none."""
         return self.growing.cost
 
-    def simplified(self, path: Path) -> Path:
+    def simplified(self, path: Path, work: Work) -> Path:
         """Return a path with fewer curves, at hardly more cost; the same where the cost is the length."""
-        return self._accepted(self._smoother.simplify(path), path)
+        return self._accepted(self._smoother.simplify(path, work), path)
 
-    def without_short_arcs(self, path: Path) -> Path:
+    def without_short_arcs(self, path: Path, work: Work) -> Path:
         """Return a path with its short arcs merged, as far as there is time; the same where paths are not smoothed."""
         if not self._settings.shortcut:
             return path
-        return self._accepted(merge_short_arcs(path, self.objective, self._settings.seed, self._deadline.poll), path)
+        return self._accepted(merge_short_arcs(path, self.objective, self._settings.seed, work), path)
 
     def _accepted(self, simple: Path, path: Path) -> Path:
         """Return the simpler form of a path, cut as the settings ask for, unless a test of the user's refuses it."""
@@ -182,8 +184,7 @@ class Search:
     @property
     def length(self) -> float | None:
         """The length of the best path so far [m], or None."""
-        path = self.path
-        return path.length if path else None
+        return self.path.length if self.path else None
 
     @property
     def done(self) -> bool:
@@ -250,7 +251,7 @@ class Search:
         while left > 0 and self.best < 0 and not runs.exhausted:
             expansions = min(EXPANSIONS, left)
             left -= expansions
-            self.growing.insert_if_better(runs.run(expansions, math.inf, self._deadline.poll), "hybrid_astar")
+            self.growing.insert_if_better(runs.run(expansions, math.inf, self.work), "hybrid_astar")
             yield self._may_end(smoothing_is_due=self._settings.shortcut)
 
     def _improve_first_path(self, runs: HybridAStarRuns) -> Iterator[bool]:
@@ -282,7 +283,7 @@ class Search:
             yield self._may_end()
 
     def _run_ended(self, runs: HybridAStarRuns, expansions: int) -> bool:
-        self.growing.insert_if_better(runs.run(expansions, self.cost, self._deadline.poll), "hybrid_astar")
+        self.growing.insert_if_better(runs.run(expansions, self.cost, self.work), "hybrid_astar")
         return runs.between_runs or runs.exhausted
 
     def _start_bounds(self) -> None:
@@ -307,7 +308,8 @@ class Search:
             used, batch = self._take_batch(block, used, batch)
             if used == BLOCK:
                 yield from self._wait_for_runs()
-                self._end_block()
+                if self.work.begins():
+                    self._end_block()
             rounds = self._rounds_due(had_path, used == BLOCK)
             corridor_is_due = self._corridors is not None and self._corridors.is_due(self.samples)
             yield self._may_end(smoothing_is_due=bool(rounds) or corridor_is_due)
@@ -334,13 +336,14 @@ class Search:
     def _take_batch(self, block: np.ndarray, begin: int, size: int) -> tuple[int, int]:
         """Add samples of a block to the tree, up to the first path; return the next sample's index and the next batch's size."""
         left = self._settings.samples - self.samples
-        end = min(begin + min(size, left if left > 0 else size, self._until_report()), BLOCK)
+        end = min(begin + self.work.portion(min(size, left if left > 0 else size, self._until_report())), BLOCK)
         if self._corridors and not self._corridors.exhausted:
             end = min(end, begin + self._corridors.next_at - self.samples)
         started = time.perf_counter()
         # Where hybrid A* has failed, Algorithm 1 is the quicker one to a first path.
         next_one = self.growing.take(block, begin, end, self._is_rrt or (self._informed is not None and self.best < 0))
         took, taken = time.perf_counter() - started, next_one - begin
+        self.work.done += taken
         return next_one, min(max(1, int(BATCH_TIME * taken / max(took, 1e-6))), 2 * size, BLOCK)
 
     def _until_report(self) -> int:
@@ -355,9 +358,9 @@ class Search:
         runs = self._informed.runs
         self.growing.insert_if_better(runs.collect(), "hybrid_astar")
         if not runs.exhausted:
-            has_footprint = bool(self._problem.vehicle.footprint)
-            expansions = BACKGROUND_EXPANSIONS_OF_POLYGON if has_footprint else BACKGROUND_EXPANSIONS
-            runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost, lambda: self._deadline.is_over)
+            expansions = BACKGROUND_EXPANSIONS_OF_POLYGON if self._problem.vehicle.footprint else BACKGROUND_EXPANSIONS
+            interrupted = self.work.interrupting(lambda: self._deadline.is_over)
+            runs.start(expansions if self.best >= 0 else WITHOUT_PATH * expansions, self.cost, interrupted)
 
     def _limit_to_best(self) -> bool:
         """Draw and add only what can be on a cheaper path than the best, and forget other nodes; False where nothing limits."""
@@ -370,13 +373,13 @@ class Search:
             self.make_bound()
             if self._settings.shortcut and not self._is_rrt:
                 self._corridors = Corridors(self._problem, self.objective, from_start, bounds.to_goal, self.cost,
-                                            self._settings.seed, self._deadline.poll, self.samples)
+                                            self._settings.seed, self.work, self.samples)
         self.growing.limit_to_best(bounds, from_start)
         return True
 
     def _try_corridor(self) -> None:
         """Try one more corridor that may be shorter than the best path."""
-        if self._corridors and (path := self.path):
+        if self._corridors and (path := self.path) and self.work.begins():
             self.growing.insert_if_better(self._corridors.next_path(path, self.samples), "hybrid_astar")
 
     def _rounds_due(self, had_path: bool, block_ended: bool) -> range:
@@ -390,8 +393,8 @@ class Search:
     def _smooth(self, rounds: range) -> Iterator[bool]:
         """Smooth the best path; round 0 is that of a path with large loops."""
         for number in rounds:
-            before, path = self.cost, self.path
-            if path:
+            before = self.cost
+            if path := self.path:
                 self.growing.insert_smoothed(self._smoother.smooth(path, first_round=number == 0))
             self._smoother.record(before, self.cost)
             yield self._may_end(smoothing_is_due=number + 1 < ROUNDS)

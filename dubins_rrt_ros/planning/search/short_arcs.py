@@ -5,7 +5,7 @@ Dubins curve between its ends, or by two that meet in a pose beside the path.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -14,8 +14,8 @@ from ..curves import dubins
 from ..curves.angles import wrap
 from ..curves.dubins import SIDES, WORDS, DubinsCurve
 from ..curves.path import Path
-from ..deadline import never
 from ..problem import Pose
+from ..work import Work
 from .cost import Objective
 
 #: An arc is short below this length [m] ...
@@ -39,19 +39,20 @@ SAME = 1e-11
 _SIDES = np.array([[SIDES[letter] for letter in word] for word in WORDS])
 
 
-def merge_short_arcs(path: Path, objective: Objective, seed: int, interrupted: Callable[[], bool] = never) -> Path:
+def merge_short_arcs(path: Path, objective: Objective, seed: int, work: Work | None = None) -> Path:
     """Return a path with the same ends, without empty curves, and without short arcs where there is room to merge them.
 
     Args:
         path: free for the vehicle, and so is what is returned, which is at most MOST_LONGER longer, and as much dearer.
         objective: the vehicle, the clearance of the map, and the cost.
         seed: of the sections that are tried.
-        interrupted: called after every try; True ends with the path as it is by then.
+        work: counts the sections that are tried; once it is over the path stays as it is by then.
     """
-    if not LEAST_RADIUS <= path.radius < math.inf:
+    work = work or Work()
+    if not LEAST_RADIUS <= path.radius < math.inf or not work.begins():
         return path
     rng = np.random.default_rng((seed, 5))  # the numbers that Corridors draws too, no others
-    return _Merger(path, objective, rng, interrupted).merge(_without_empty_curves(path))
+    return _Merger(path, objective, rng, work).merge(_without_empty_curves(path))
 
 
 def short_arcs(path: Path) -> list[tuple[float, float]]:
@@ -94,9 +95,9 @@ def _turns(path: Path) -> list[tuple[float, float]]:
 class _Merger:
     """Tries other sections around the short arcs of a path."""
 
-    def __init__(self, path: Path, objective: Objective, rng: np.random.Generator, interrupted: Callable[[], bool]):
+    def __init__(self, path: Path, objective: Objective, rng: np.random.Generator, work: Work):
         self._checker = objective.field.collision_checker(objective.vehicle)
-        self._objective, self._rng, self._interrupted = objective, rng, interrupted
+        self._objective, self._rng, self._work = objective, rng, work
         self._longest, self._dearest = path.length + MOST_LONGER, objective.path_cost(path) + MOST_LONGER
 
     def merge(self, path: Path) -> Path:
@@ -105,7 +106,7 @@ class _Merger:
         while kept < len(found := short_arcs(path)):
             merged = self._merged(path, found[kept], len(found))
             kept, path = (kept + 1, path) if merged is None else (kept, merged)
-            if self._interrupted():
+            if self._work.is_over:
                 break
         return path
 
@@ -113,7 +114,7 @@ class _Merger:
         """Return the path with fewer than `count` short arcs, or None where no try succeeds."""
         turns = _turns(path)
         for _ in range(TRIES):
-            if self._interrupted():
+            if not self._work.begins():
                 break
             begin, middle, end = self._section(turns, arc, path.length)
             curves = self._curves(path, begin, middle, end)

@@ -1,7 +1,6 @@
 """Smoothing: shortcuts and moved waypoints make a path cheaper, and keep it free; a price of each curve makes it simpler."""
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -9,8 +8,8 @@ import numpy as np
 from .._kernels.shortcut import Shortcutter
 from ..collision.clearance import ClearanceField
 from ..curves.path import Path
-from ..deadline import never
 from ..vehicle import Vehicle
+from ..work import Work
 from .cost import Objective
 from .pace import Pace
 
@@ -29,16 +28,17 @@ WORTHWHILE_GAIN = 1e-4
 
 
 def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool,
-           interrupted: Callable[[], bool] = never, objective: Objective | None = None, price: float = 0.0) -> Path:
+           work: Work | None = None, objective: Objective | None = None, price: float = 0.0) -> Path:
     """Return a path with the same ends that never costs more, but for what the price of curves saves.
 
     Args:
         path: it is free for the vehicle, and so is what is returned.
         first_round: True if it was not smoothed before, and may have large loops.
-        interrupted: called every few milliseconds; True ends the round with the path as it is by then.
+        work: counts the changes that are tried; once it is over the round ends with the path as it is by then.
         objective: the cost; None makes it the length.
         price: what a curve more may save [m]; without effect where the cost is the length.
     """
+    work = work or Work()
     edge_cost = (objective or Objective(vehicle, field)).edge_cost()
     costly = SIMPLIFYING_TRIES if price > 0 else FIRST_COSTLY_TRIES if first_round else COSTLY_TRIES
     tries = TRIES if edge_cost.is_length else costly
@@ -47,14 +47,17 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
                               scale=vehicle.maneuver_scale, poses=path.waypoints, words=path.words, lengths=path.lengths,
                               tries=tries, price=price)
     pace, tried, is_left = Pace(FIRST_SLICE, tries), 0, True
-    while is_left and not interrupted():
-        checks = pace.size
+    while is_left and not work.is_over:
+        checks = work.portion(pace.size)
         with pace.measured(checks):
-            is_left = shortcutter.prepare(checks)
-    while tried < tries and not interrupted():
-        begin, tried = tried, min(tried + pace.size, tries)
+            checked = shortcutter.prepare(checks)
+        work.done += checked
+        is_left = checked == checks
+    while tried < tries and not work.is_over:
+        begin, tried = tried, min(tried + work.portion(pace.size), tries)
         with pace.measured(tried - begin):
             shortcutter.improve(draws, begin, tried, FIRST_SHORTCUTS if first_round else LATER_SHORTCUTS)
+        work.done += tried - begin
     waypoints, words, lengths = (np.array(view[:shortcutter.count])
                                  for view in (shortcutter.poses, shortcutter.words, shortcutter.lengths))
     smoothed = Path(waypoints, words, lengths, path.radius)
@@ -64,8 +67,8 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
 class Smoother:
     """Smooths the best path of a search as long as that is worthwhile, by random numbers of its own."""
 
-    def __init__(self, objective: Objective, seed: int, interrupted: Callable[[], bool]):
-        self._objective, self._seed, self._interrupted = objective, seed, interrupted
+    def __init__(self, objective: Objective, seed: int, work: Work):
+        self._objective, self._seed, self._work = objective, seed, work
         self._exhausted_at = math.inf
 
     @cached_property
@@ -74,10 +77,10 @@ class Smoother:
 
     def smooth(self, path: Path, first_round: bool) -> Path:
         """Return a path with the same ends that never costs more."""
-        return smooth(path, self._objective.vehicle, self._objective.field, self._rng, first_round, self._interrupted,
+        return smooth(path, self._objective.vehicle, self._objective.field, self._rng, first_round, self._work,
                       self._objective)
 
-    def simplify(self, path: Path) -> Path:
+    def simplify(self, path: Path, work: Work) -> Path:
         """Return a path with the same ends and fewer curves that costs hardly more; the same path where the cost is the length.
 
         A bend that is wider than the turning radius is no Dubins curve, and the search makes it of many.
@@ -88,9 +91,9 @@ class Smoother:
         price = PRICE * self._objective.vehicle.maneuver_scale
         cost, before = self._objective.path_cost(path) + price * len(path.words), math.inf
         for _ in range(SIMPLIFICATIONS):
-            if before - cost < price or self._interrupted():
+            if before - cost < price or work.is_over:
                 break
-            path = smooth(path, self._objective.vehicle, self._objective.field, rng, False, self._interrupted, self._objective,
+            path = smooth(path, self._objective.vehicle, self._objective.field, rng, False, work, self._objective,
                           price)
             before, cost = cost, self._objective.path_cost(path) + price * len(path.words)
         return path
