@@ -172,7 +172,7 @@ class _Call:
                         self._report_samples)
         self._objective = search.objective
         self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over, search.objective.is_length)
-        for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field))):
+        for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field, search.growing.nearest))):
             if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
                 return trapped
             if search.best >= 0 and self._time_to_found is None:
@@ -198,13 +198,15 @@ class _Call:
         """Take over a length that no path falls below; none costs less than its length."""
         self._bound, self._cost_bound = max(self._bound, bound), max(self._cost_bound, bound)
 
-    def _usable_seed(self, field: ClearanceField) -> Path | None:
-        """Return the path that the seed path gives for this problem, if it does."""
+    def _usable_seed(self, field: ClearanceField, nearest: tuple[float, float] | None) -> Path | None:
+        """Return the path that the seed path gives for this problem, if it does; to the nearest position if there is one."""
         seed, problem = self._seed_path, self._problem
         if seed is None or len(seed.waypoints) < 2 or seed.radius != problem.vehicle.turning_radius:
             return None
         goal = seed.end if reaches_goal(seed.end, problem, rounding=0.0) else problem.goal
-        return KnownPath(seed, field, problem.vehicle).joined(problem.start, goal)
+        known = KnownPath(seed, field, problem.vehicle)
+        to_nearest = known.joined(problem.start, (*nearest, goal[2])) if nearest and nearest != goal[:2] else None
+        return to_nearest or known.joined(problem.start, goal)
 
     def _report(self, search: Search) -> None:
         """Report a better path, once it is shortened and audited, and the state of the search from time to time."""

@@ -69,8 +69,8 @@ class Problem:
     vehicle: Vehicle
     start: Pose
     goal: Pose
-    goal_tolerance_xy: float = option(0.0, "maximum distance from the goal at the end of the path; 0 requires the exact position",
-                                      unit="m", low=0.0, high=1e6)
+    goal_tolerance_xy: float = option(0.0, "maximum distance from the goal at the end of the path, which leads to the free pose "
+                                      "nearest to the goal; 0 requires the exact position", unit="m", low=0.0, high=1e6)
     goal_tolerance_yaw: float = option(0.0, "maximum heading error at the end of the path; 0 requires the exact heading",
                                        unit="rad", low=0.0, high=math.pi)
     any_goal_heading: bool = option(False, "accept any heading at the goal")

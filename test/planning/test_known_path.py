@@ -9,7 +9,9 @@ from support.cases import boxes_grid, maze_grid, needs_compiled, scaled
 from support.yard import GOAL, START, yard
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Status, Vehicle, plan, prepare
+from dubins_rrt_ros.planning.collision.clearance import ClearanceField
 from dubins_rrt_ros.planning.curves import dubins
+from dubins_rrt_ros.planning.curves.path import Path
 from dubins_rrt_ros.planning.search.known_path import KnownPath
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
@@ -56,6 +58,15 @@ def test_junctions_are_the_cheapest_free_curves(world, first, onto_path):
 def test_its_own_ends_are_joined_by_itself(world, first):
     again = KnownPath(first, world.field, DISC).joined(START, GOAL)
     assert again.length == pytest.approx(first.length)
+
+
+def test_where_the_ways_onto_the_path_and_off_it_cross_the_direct_curve_is_taken(world):
+    straight = Path.of_curves((2.0, 1.0, 0.0), (6.0, 1.0, 0.0), [dubins.shortest((2.0, 1.0, 0.0), (6.0, 1.0, 0.0), 1.0)])
+    known, goal = KnownPath(straight, ClearanceField(GridMap(np.zeros((100, 100), np.int8), 0.1)), DISC), (6.2, 1.0, 0.0)
+    for start in (2.0, 1.0, 0.0), (2.1, 1.0, 0.0), (5.9, 1.0, 0.0):
+        joined = known.joined(start, goal)
+        assert (joined.start, joined.end) == (start, goal)
+        assert joined.length == pytest.approx(6.2 - start[0])
 
 
 def test_what_is_blocked_now_is_not_joined(world, first):

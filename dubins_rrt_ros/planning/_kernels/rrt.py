@@ -88,6 +88,17 @@ class RrtKernel:
         self.bounded = True
         self.cost_bound, self.from_start, self.to_goal = cost_bound, from_start, to_goal
 
+    def narrow_goal(self, x: cython.double, y: cython.double):
+        """Count only nodes at a position, which the goal's tolerance allows, as reaching the goal from now on."""
+        kept: cython.int = 0
+        i: cython.int
+        self.goal, self.tolerance_xy = Pose(x, y, self.goal.theta), 0
+        for i in range(self.goal_count):
+            if self.tree.poses[self.goal_nodes[i], 0] == x and self.tree.poses[self.goal_nodes[i], 1] == y:
+                self.goal_nodes[kept] = self.goal_nodes[i]
+                kept += 1
+        self.goal_count = kept
+
     def insert_path(self, poses: cython.double[:, ::1], words: cython.schar[::1], lengths: cython.double[:, ::1],
                     end: cython.int):
         """Add a path from the root, and rewire the nodes near it.

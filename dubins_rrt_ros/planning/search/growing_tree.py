@@ -1,6 +1,7 @@
 """The tree of a search under way, and the best path in it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..settings import Settings
 from .cost import Objective
 from .cost_bounds import CostBounds
 from .cost_to_go import CostToGo
+from .known_path import KnownPath
 from .tree import Tree, path_to
 
 #: The factor of log n in the number of near nodes, and their maximum number.
@@ -28,10 +30,18 @@ class GrowingTree:
         best: the node that reaches the goal at the least cost, or -1.
         found_by: what found the path there, before it was smoothed: hybrid_astar, rrt, rrt_star or seed_path; "" without one.
         objective: what is minimised.
+        nearest: position that the goal allows and that is preferred to all others, as long as no path leads there, or None.
+        problem: the problem with the goals that count: once a path leads to `nearest`, these are the poses there.
     """
 
-    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField):
-        """Begin with the start alone."""
+    def __init__(self, problem: Problem, settings: Settings, field: ClearanceField, nearest: np.ndarray | None = None):
+        """Begin with the start alone.
+
+        Args:
+            nearest: (2,) position of those that the goal allows that is preferred to all others, or None.
+        """
+        self.problem = problem
+        self.nearest = None if nearest is None or problem.goal_tolerance_xy == 0 else tuple(nearest.tolist())
         self.objective = Objective.of(problem, settings, field)
         self.samples = 0
         self.best = -1
@@ -43,7 +53,7 @@ class GrowingTree:
             tree=self._tree, checker=field.collision_checker(problem.vehicle), edge_cost=self.objective.edge_cost(),
             step=settings.step_size, near_factor=NEAR_FACTOR, max_near=MOST_NEAR, goal=problem.goal,
             tolerance_xy=problem.goal_tolerance_xy, tolerance_yaw=problem.yaw_tolerance)
-        self._step, self._exact_goal = settings.step_size, problem.exact_goal
+        self._step = settings.step_size
 
     @property
     def size(self) -> int:
@@ -81,8 +91,18 @@ class GrowingTree:
 
     def insert_if_better(self, path: Path | None, found_by: str) -> None:
         """Add a path to the goal to the tree, if it is the best."""
-        end = self.best if self._exact_goal else -1
-        if path is not None and self.objective.path_cost(path) < self.cost and self._insert(path, end):
+        if path is not None and self.objective.path_cost(path) < self.cost:
+            self._insert_found(path, found_by)
+
+    def approach_nearest(self) -> None:
+        """Lead the best path on to the nearest position, where it ends elsewhere and can be led there."""
+        if self.nearest and (path := self.path):
+            known = KnownPath(path, self.objective.field, self.problem.vehicle)
+            if led_on := known.joined(path.start, (*self.nearest, path.end[2])):
+                self._insert_found(led_on, self.found_by)
+
+    def _insert_found(self, path: Path, found_by: str) -> None:
+        if self._insert(path, self.best if self.problem.exact_goal else -1, narrow=path.end[:2] == self.nearest):
             self.found_by = found_by
 
     def insert_smoothed(self, path: Path) -> None:
@@ -90,11 +110,20 @@ class GrowingTree:
         if self.objective.path_cost(path) < self.cost:
             self._insert(path, self.best)
 
-    def _insert(self, path: Path, end: int) -> bool:
-        """Add a path to the tree, unless a test of the user's refuses it; `end` is the node at its end, or -1 for none."""
+    def _insert(self, path: Path, end: int, narrow: bool = False) -> bool:
+        """Add a path to the tree, unless a test of the user's refuses it.
+
+        Args:
+            end: the node at the end of the path, or -1 for none.
+            narrow: True if nothing but the position of its end is to count as the goal from now on.
+        """
         pieces = path.cut(self._step)
         if not self.objective.field.test_accepts(pieces):
             return False
+        if narrow:
+            self._kernel.narrow_goal(*path.end[:2])
+            self.problem = replace(self.problem, goal=(*path.end[:2], self.problem.goal[2]), goal_tolerance_xy=0.0)
+            self.nearest = None
         self._kernel.insert_path(pieces.waypoints, pieces.words, pieces.lengths, end)
         self.best = self._kernel.best_goal_node()
         return True

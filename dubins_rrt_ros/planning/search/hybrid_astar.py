@@ -12,7 +12,6 @@ from .._kernels.collision import CollisionChecker
 from .._kernels.edge_cost import EdgeCost
 from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
-from ..curves.angles import wrap
 from ..curves.path import Path
 from ..deadline import never
 from ..problem import Problem
@@ -21,6 +20,7 @@ from ..work import Work
 from .background import BACKGROUND, BackgroundJob
 from .cost import Objective
 from .cost_to_go import CostToGo
+from .goal_poses import goal_poses
 from .pace import Pace
 from .smoothing import smooth
 
@@ -57,16 +57,13 @@ SLACK = 1.05
 MOST_EXPANDED = 200_000
 #: Number of poses that are expanded at first before the time is looked at, and their maximum number later.
 FIRST_SLICE, LARGEST_SLICE = 16, 1024
-#: Number of headings that are tried at a goal where several will do.
-HEADINGS_AT_GOAL = 16
-#: Numbers of distances and of directions from a goal that is not free in which a free pose is sought within its tolerance.
-DISTANCES_AT_GOAL, BEARINGS_AT_GOAL = 33, 24
 
 
 class HybridAStarRuns:
     """Runs of hybrid A*, one after the other, in portions; `run` returns the path of a run that found one.
 
     Attributes:
+        goals: (m, 3) poses that the paths lead to, all at one position.
         exhausted: True if no run is left, as too many in a row were in vain.
     """
 
@@ -81,7 +78,7 @@ class HybridAStarRuns:
         self._edge_cost = self._objective.edge_cost()
         self._checker = field.collision_checker(problem.vehicle)
         self._settings = settings
-        self._goals = goal_poses(problem, self._checker)
+        self.goals = goal_poses(problem, field)
         self._current: HybridAStar | None = None
         self._in_background: BackgroundJob[Path | None] | None = None
         self._pace = Pace(FIRST_SLICE, LARGEST_SLICE)
@@ -180,7 +177,7 @@ class HybridAStarRuns:
 
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
         return new_search(self._problem, self._checker, self._edge_cost, arc, headings, weight, visit_penalty,
-                          start=self._problem.start, goals=self._goals, to_goal=self._to_goal.kernel, **options)
+                          start=self._problem.start, goals=self.goals, to_goal=self._to_goal.kernel, **options)
 
     def _measures(self, is_first: bool) -> tuple[float, int, float]:
         """Return the length of the next run's arcs in turning radii, its number of headings, its weight of the cost-to-go."""
@@ -219,36 +216,3 @@ def expand(search: HybridAStar, pace: Pace, expansions: int, work: Work) -> None
             search.run(size)
         work.done += search.expanded - before + search.ended
         expansions -= size
-
-
-def goal_poses(problem: Problem, checker: CollisionChecker) -> np.ndarray:
-    """Return (m, 3) poses that reach the goal: at its position, or next to it where that has a tolerance and is not free.
-
-    They have the goal's heading, and others where that has a tolerance.
-    """
-    goals = _turned(np.array([problem.goal]), problem.yaw_tolerance)
-    if problem.goal_tolerance_xy == 0 or any(map(checker.is_pose_free, goals.tolist())):
-        return goals
-    nearest = _nearest_free(problem, checker)
-    return goals if nearest is None else _turned(nearest, problem.yaw_tolerance)
-
-
-def _turned(poses: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return (m, 3) poses: those given, and the same with other headings up to a tolerance [rad]."""
-    if tolerance == 0:
-        return poses
-    turns = tolerance * np.linspace(-1, 1, HEADINGS_AT_GOAL + 1)[1:]
-    turned = np.repeat(poses, len(turns), axis=0)
-    turned[:, 2] = wrap(turned[:, 2] + np.tile(turns, len(poses)))
-    return np.concatenate([poses, turned])
-
-
-def _nearest_free(problem: Problem, checker: CollisionChecker) -> np.ndarray | None:
-    """Return the (1, 3) free pose nearest to the goal, of those tried, with the goal's heading; None where none is free."""
-    bearings = np.linspace(0, math.tau, BEARINGS_AT_GOAL, endpoint=False)
-    for distance in problem.goal_tolerance_xy * np.linspace(0, 1, DISTANCES_AT_GOAL, endpoint=False)[1:]:
-        steps = distance * np.column_stack([np.cos(bearings), np.sin(bearings), 0 * bearings])
-        for pose in problem.goal + steps:
-            if checker.is_pose_free(pose):
-                return np.array([pose])
-    return None

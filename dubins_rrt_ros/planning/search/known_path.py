@@ -74,8 +74,13 @@ class KnownPath:
     def joined(self, start: Pose, goal: Pose) -> Path | None:
         """Return the cheapest path from start to goal over this one, all of it free, or None."""
         (_, (first,)), (_, (last,)) = self.onto([start]), self.off([goal])
-        if min(first, last) < 0 or first > last:
+        if min(first, last) < 0:
             return None
+        if first > last:  # the cheapest ways onto the path and off it cross
+            if start != self.start:
+                direct = dubins.shortest(start, goal, self._radius)
+                return Path.of_curves(start, goal, [direct]) if self._are_free([direct]) else None
+            first = 0
         return self.between(start, first, goal, last) if self._are_free(self._path.curves[first:last]) else None
 
     @property

@@ -105,15 +105,15 @@ class Search:
             deadline: when it is over what is under way is cut short; the steps of `run` that follow it are unspecified.
             report_samples: number of samples after each of which a step of `run` ends; 0 for any.
         """
-        self.growing = GrowingTree(problem, settings, field)
+        runs = HybridAStarRuns(problem, settings, field, to_goal) if settings.informed and to_goal else None
+        self.growing = GrowingTree(problem, settings, field, nearest=runs.goals[0, :2] if runs else None)
         self.ready = False
         self._problem, self._settings, self._report_samples = problem, settings, report_samples
         self._deadline = deadline or Deadline(math.inf, never)
         self.work = Work(self._deadline.poll, settings.work_limits.search)
         self._informed: Informed | None = None
-        if settings.informed and to_goal:
-            self._informed = Informed(HybridAStarRuns(problem, settings, field, to_goal),
-                                      CostBounds(problem, field, to_goal, self.objective))
+        if runs and to_goal:
+            self._informed = Informed(runs, CostBounds(problem, field, to_goal, self.objective))
         self._corridors: Corridors | None = None
         self._sampler = Sampler(problem, settings, field, to_goal)
         self._smoother = Smoother(self.objective, settings.seed, self.work)
@@ -298,7 +298,8 @@ class Search:
         """Draw a block of samples and take it, batch by batch; return the size of the next batch."""
         yield from self._wait_for_bounds()
         is_limited = self._limit_to_best()
-        block = self._sampler.draw(BLOCK, self._informed.bounds.from_start if self._informed else None, self.path)
+        from_start = self._informed.bounds.from_start if self._informed else None
+        block = self._sampler.draw(BLOCK, from_start, self.path, self.growing.problem)
         used = 0
         while used < BLOCK and not self.done:
             if not is_limited:
@@ -306,6 +307,8 @@ class Search:
                 is_limited = self._limit_to_best()
             had_path = self.best >= 0
             used, batch = self._take_batch(block, used, batch)
+            if not had_path:
+                self.growing.approach_nearest()
             if used == BLOCK:
                 yield from self._wait_for_runs()
                 if self.work.begins():

@@ -45,16 +45,18 @@ class Sampler:
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self._settings.seed)
 
-    def draw(self, count: int, from_start: CostToGo | None = None, best: Path | None = None) -> np.ndarray:
+    def draw(self, count: int, from_start: CostToGo | None = None, best: Path | None = None, goals: Problem | None = None
+             ) -> np.ndarray:
         """Draw (count, 3) float64 poses: x [m], y [m], theta [rad].
 
         Args:
             from_start, best: bounds of the costs from the start, and the best path so far; the samples are informed by both.
+            goals: the problem with the goals to draw, if these are not all that the problem allows.
         """
         sampler = self._settings.sampler
         poses = draw_poses(sampler, self._rng, count) if sampler else self._own_draw(count, from_start, best)
         at_goal = np.flatnonzero(self._rng.random(count) < self._settings.goal_bias)
-        poses[at_goal] = self._goals(len(at_goal))
+        poses[at_goal] = self._goals(len(at_goal), goals or self._problem)
         return poses
 
     def _own_draw(self, count: int, from_start: CostToGo | None, best: Path | None) -> np.ndarray:
@@ -112,9 +114,8 @@ class Sampler:
         poses[:, 2] = wrap(poses[:, 2] + NEAR_ANGLE * size * self._rng.normal(size=count))
         return poses
 
-    def _goals(self, count: int) -> np.ndarray:
+    def _goals(self, count: int, problem: Problem) -> np.ndarray:
         """Draw (count, 3) poses that reach the goal: the goal itself, or uniform over its tolerance."""
-        problem = self._problem
         if problem.exact_goal:
             return np.tile(problem.goal, (count, 1))
         distance = problem.goal_tolerance_xy * np.sqrt(self._rng.random(count))
