@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from support.cases import needs_compiled, random_maps, random_problem, scaled
 
-from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, plan, prepare
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan, prepare
 from dubins_rrt_ros.planning._kernels.dubins import shortest_lengths
 from dubins_rrt_ros.planning._kernels.interval_curves import bounds_between, shortest_of_intervals
 from dubins_rrt_ros.planning.deadline import never
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.proof.boxes import Portal
 from dubins_rrt_ros.planning.proof.length_proof import LengthProof
 from dubins_rrt_ros.planning.proof.level_sets import LevelSets
+from dubins_rrt_ros.planning.proof.portals import PortalGraph
 from dubins_rrt_ros.planning.search.background import PROOFS, BackgroundJob
 
 START, GOAL = (1.5, 2.0, 1.57), (13.5, 10.5, 1.57)
@@ -95,6 +97,62 @@ def test_the_pieces_of_a_level_are_where_the_cost_is_the_level(maze):
         assert np.mean(risen > level) > 0.95  # the others are on a triangle's edge, or at an obstacle
 
 
+def test_a_level_is_made_of_portals_that_are_apart(maze):
+    sets = LevelSets(maze, maze.world.field)
+    for level in (2.0, 7.3, 15.0):
+        pieces, portals = sets.pieces(level, 25.0), sets.portals(level, 25.0)
+        assert sorted(np.concatenate([portal.squares for portal in portals])) == sorted(pieces.squares)
+        labels = sets.components(level, level, 25.0)
+        of_portals = [set(labels[portal.squares].tolist()) for portal in portals]
+        assert all(len(of_portal) == 1 for of_portal in of_portals) and 0 not in set().union(*of_portals)
+
+
+def island():
+    """A problem with two ways round a wall of 4 m, which both are nearly shortest."""
+    cells = np.zeros((80, 120))
+    cells[38:42, 40:80] = 100
+    world = prepare(GridMap(cells, 0.1, (0.0, 0.0, 0.0)), Vehicle(turning_radius=0.5, robot_radius=0.2))
+    return Problem(world, start=(1.0, 4.0, 0.0), goal=(11.0, 4.0, 0.0))
+
+
+def test_a_path_goes_back_to_come_from_one_way_round_to_the_other():
+    """Beside the wall it is at least as long as the rise and twice the way back to where the wall begins."""
+    problem = island()
+    sets = LevelSets(problem, problem.world.field)
+    start, goal = (Portal.of_pose(pose, 0.0, 0.0, level, square) for pose, level, square in (
+        (problem.start, 0.0, -1), (problem.goal, sets.end, sets.square_at(problem.goal[:2]))))
+    graph = PortalGraph(sets, 14.0, start, goal)
+    lower, upper = graph.portals_at(6.0), graph.portals_at(6.5)
+    assert len(lower) == len(upper) == 2
+    for portal in (*lower, *upper):
+        portal.cover()
+    graph.link()
+    assert [edge.portal for edge in graph.edges(lower[0], backwards=True)] == [portal for portal in upper
+                                                                               if same_side(portal, lower[0])]
+    assert {edge.portal for edge in graph.cut(goal, 2, False)} == set(lower)
+
+
+def same_side(portal, other):
+    return (portal.boxes[:, 1].mean() > 4) == (other.boxes[:, 1].mean() > 4)
+
+
+def test_portals_that_are_not_covered_are_passed_by():
+    problem = island()
+    sets = LevelSets(problem, problem.world.field)
+    start = Portal.of_pose(problem.start, 0.0, 0.0, 0.0)
+    goal = Portal.of_pose(problem.goal, 0.0, 0.0, sets.end, sets.square_at(problem.goal[:2]))
+    graph = PortalGraph(sets, 14.0, start, goal)
+    one, other = graph.portals_at(6.0)
+    one.cover()
+    graph.link()
+    assert {id(edge.portal) for edge in graph.edges(goal)} == {id(start), id(one)}
+    assert graph.cover_between(start, goal, 6.0)
+    graph.link()
+    assert {id(edge.portal) for edge in graph.edges(goal)} == {id(one), id(other)}
+    assert graph.cover_between(one, goal, 8.0)
+    assert len(graph.portals_at(8.0)) == 1 or sum(portal.is_covered for portal in graph.portals_at(8.0)) == 1
+
+
 @needs_compiled
 def test_every_path_crosses_the_levels_in_order(maze):
     sets = LevelSets(maze, maze.world.field)
@@ -122,7 +180,7 @@ def test_a_proof_that_is_interrupted_as_it_begins_has_fewer_levels_and_holds(maz
     result = plan(maze, Settings(seed=1, samples=300))
     for looks in (0, 2):
         proof = LengthProof(maze, maze.world.field, result.path, interrupted=rounds(looks))
-        assert len(proof._layers) == looks + 2  # start, levels and goal
+        assert len(proof.levels) == looks
         proof.run(rounds(20), gap=0.015)
         assert 0 < proof.bound <= result.length
 

@@ -172,46 +172,73 @@ def least_between(ax: cython.double, ay: cython.double, au: cython.double, av: c
 
 
 def relax(costs: cython.double[::1], boxes: cython.double[:, ::1], next_boxes: cython.double[:, ::1],
-          left: cython.double[::1], radius: cython.double, limit: cython.double, backwards: cython.bint,
-          out: cython.double[::1], best: cython.int[::1]):
-    """Write the least cost of a chain to each of `next_boxes` to `out`, and the index of the box before it to `best`.
+          left: cython.double[::1], least_edge: cython.double, radius: cython.double, limit: cython.double,
+          backwards: cython.bint, out: cython.double[::1], best: cython.int[::1]):
+    """Lower the costs of chains to `next_boxes` in `out`, and write the index of the box before each to `best`, or -1.
 
     Args:
         costs: lower bounds of the costs of chains up to each of `boxes` [m].
-        left: lower bounds of the costs from `next_boxes` on [m]; chains that cost `limit` or more with them are left out, and
-            a box that none reaches for less has a cost of 1e300.
+        left: lower bounds of the costs from `next_boxes` on [m]; chains that cost `limit` or more with them are left out.
+        least_edge: length of which no curve between two of these boxes falls short [m].
         backwards: True if chains lead from `next_boxes` to `boxes`, so that costs are counted from the end.
     """
     i: cython.Py_ssize_t
     j: cython.Py_ssize_t
+    k: cython.Py_ssize_t
     with cython.nogil:
         for j in range(next_boxes.shape[0]):
-            least: cython.double = limit - left[j]
+            least: cython.double = min(limit - left[j], out[j])
             best[j] = -1
-            there: Interval = Interval(next_boxes[j, 6], next_boxes[j, 7])
-            for i in range(boxes.shape[0]):
-                if costs[i] >= least:
+            # The most promising box first, so that most of the others are not looked at.
+            first: cython.Py_ssize_t = most_promising(costs, boxes, next_boxes, j, radius, least)
+            for k in range(-1, boxes.shape[0]):
+                i = first if k < 0 else k
+                if k == first or costs[i] + least_edge >= least:
                     continue
-                here: Interval = Interval(boxes[i, 6], boxes[i, 7])
-                edge: cython.double
-                if backwards:
-                    edge = least_between(next_boxes[j, 0], next_boxes[j, 1], next_boxes[j, 2], next_boxes[j, 3],
-                                         next_boxes[j, 4], next_boxes[j, 5], there, boxes[i, 0], boxes[i, 1], boxes[i, 2],
-                                         boxes[i, 3], boxes[i, 4], boxes[i, 5], here, radius, least - costs[i])
-                else:
-                    edge = least_between(boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5], here,
-                                         next_boxes[j, 0], next_boxes[j, 1], next_boxes[j, 2], next_boxes[j, 3],
-                                         next_boxes[j, 4], next_boxes[j, 5], there, radius, least - costs[i])
+                edge: cython.double = (edge_between(next_boxes, j, boxes, i, radius, least - costs[i]) if backwards
+                                       else edge_between(boxes, i, next_boxes, j, radius, least - costs[i]))
+                edge = max(edge, least_edge)
                 if costs[i] + edge < least:
                     least = costs[i] + edge
                     best[j] = i
-            out[j] = least if best[j] >= 0 else UNLIMITED
+            if best[j] >= 0:
+                out[j] = least
+
+
+@cython.cfunc
+@cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def edge_between(boxes: cython.double[:, ::1], i: cython.Py_ssize_t, others: cython.double[:, ::1], j: cython.Py_ssize_t,
+                 radius: cython.double, limit: cython.double) -> cython.double:
+    """Return a lower bound of the curves from box i to one of others, j, a quicker one where that is at least `limit`."""
+    return least_between(boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5],
+                         Interval(boxes[i, 6], boxes[i, 7]), others[j, 0], others[j, 1], others[j, 2], others[j, 3],
+                         others[j, 4], others[j, 5], Interval(others[j, 6], others[j, 7]), radius, limit)
+
+
+@cython.cfunc
+@cython.nogil
+@cython.exceptval(check=False)
+def most_promising(costs: cython.double[::1], boxes: cython.double[:, ::1], next_boxes: cython.double[:, ::1],
+                   j: cython.Py_ssize_t, radius: cython.double, limit: cython.double) -> cython.Py_ssize_t:
+    """Return the box from which a chain over a straight line to box j of `next_boxes` costs least, its turns counted roughly."""
+    best: cython.Py_ssize_t = 0
+    least: cython.double = UNLIMITED
+    i: cython.Py_ssize_t
+    for i in range(boxes.shape[0]):
+        if costs[i] >= limit or costs[i] >= least:
+            break
+        cost: cython.double = (costs[i] + hypot(next_boxes[j, 0] - boxes[i, 0], next_boxes[j, 1] - boxes[i, 1])
+                               + radius * fabs(remainder(next_boxes[j, 6] - boxes[i, 6], TWO_PI)) / 4)
+        if cost < least:
+            least = cost
+            best = i
+    return best
 
 
 def bounds_between(boxes: cython.double[:, ::1], others: cython.double[:, ::1], radius: cython.double, out: cython.double[::1]):
     """Write lower bounds of the curves from each of (n, 8) boxes to that of the same row of `others` to `out` [m]."""
     i: cython.Py_ssize_t
     for i in range(boxes.shape[0]):
-        out[i] = least_between(boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5],
-                               Interval(boxes[i, 6], boxes[i, 7]), others[i, 0], others[i, 1], others[i, 2], others[i, 3],
-                               others[i, 4], others[i, 5], Interval(others[i, 6], others[i, 7]), radius, UNLIMITED)
+        out[i] = edge_between(boxes, i, others, i, radius, UNLIMITED)

@@ -77,7 +77,7 @@ class Bisection:
                  backwards: bool) -> np.ndarray:
         """Return the least costs of chains to boxes, over sources whose own costs are known."""
         order = np.argsort(known, kind="stable")
-        out, best = np.empty(len(boxes)), np.empty(len(boxes), np.int32)
+        out, best = np.full(len(boxes), UNLIMITED), np.empty(len(boxes), np.int32)
         relax(known[order], np.ascontiguousarray(sources[order, :8]), np.ascontiguousarray(boxes[:, :8]),
-              np.ascontiguousarray(left), self._radius, self._target, backwards, out, best)
+              np.ascontiguousarray(left), 0.0, self._radius, self._target, backwards, out, best)
         return out

@@ -15,43 +15,92 @@ ROUNDING = 1e-12
 RIGHT_ANGLE = math.pi / 2 + 1e-6
 
 
-class Layer:
-    """The boxes on one level, or the one pose where paths begin or end.
+class Links:
+    """For each box of a portal the box before it, or after it, on the cheapest chain.
 
-    A chain has one box of each layer. All arrays have a row for each box.
+    Attributes:
+        portals: (n,) the portals that these are of, by their `id`; 0 where they are not known.
+        boxes: (n,) their indices there.
+    """
+
+    def __init__(self, count: int):
+        self.portals, self.boxes = np.zeros(count, np.int64), np.full(count, -1)
+
+    def with_more(self, count: int) -> "Links":
+        """Return the links of more boxes, which are not known."""
+        links = Links(0)
+        links.portals = np.concatenate([self.portals, np.zeros(count, np.int64)])
+        links.boxes = np.concatenate([self.boxes, np.full(count, -1)])
+        return links
+
+    def those(self, chosen: np.ndarray) -> "Links":
+        """Return the links of boxes that are chosen."""
+        links = Links(0)
+        links.portals, links.boxes = self.portals[chosen], self.boxes[chosen]
+        return links
+
+    def forget(self) -> None:
+        """Take none of the links for known."""
+        self.portals[:] = 0
+
+    def renumber(self, portal: "Portal", new: np.ndarray) -> None:
+        """Take the new indices of the boxes of a portal, -1 for those that are gone."""
+        concerned = self.portals == id(portal)
+        self.boxes[concerned] = new[self.boxes[concerned]]
+        self.portals[self.boxes < 0] = 0
+
+
+class Portal:
+    """The boxes on a connected part of a level set, or the one pose where paths begin or end.
+
+    A chain has one box of each portal that it leads through. All arrays have a row for each box.
 
     Attributes:
         level: the cost of the level set [m].
+        squares: (m,) indices of the squares that it is in.
+        left: lower bound of the way from it to the goal [m].
         boxes: (n, 8) as `_kernels/interval_curves.py` has them.
         up_to, on: lower bounds of the costs of chains from the start to a box, and from there to the goal [m].
-        before, after: the boxes before and after it on the cheapest of these chains; -1 where they are not known.
+        before, after: `Link`s to the boxes before and after it on the cheapest of these chains.
         total: lower bound of the costs of chains through a box [m].
         is_open: True for boxes that may be on a chain below the length that is being proved.
     """
 
-    def __init__(self, sets: LevelSets, level: float, limit: float):
-        """Cover a level set, as far as paths shorter than `limit` may cross it."""
+    def __init__(self, sets: LevelSets, level: float, pieces: Pieces, limit: float):
+        """Take the part of a level set that is made of some pieces, as far as paths shorter than `limit` may cross it."""
         self.level, self._sets, self._limit = level, sets, limit
+        self.squares, self.left = pieces.squares, sets.least_left_in(pieces.squares)
+        self._pieces: Pieces | None = pieces
         self._clear()
-        pieces = sets.pieces(level, limit)
-        self._add(_boxes_of(pieces), pieces.gradients)
+
+    def cover(self) -> "Portal":
+        """Cover it with boxes, unless that was done; return it."""
+        if self._pieces:
+            pieces, self._pieces = self._pieces, None
+            self._add(_boxes_of(pieces), pieces.gradients)
+        return self
+
+    @property
+    def is_covered(self) -> bool:
+        """True if chains that come by have to lead over its boxes."""
+        return self._pieces is None
 
     def _clear(self) -> None:
         self.boxes = np.empty((0, 8))
         self._gradients, self._left, self.up_to, self.on, self.total = np.empty((5, 0))
-        self.before = self.after = np.empty(0, int)
+        self.before, self.after = Links(0), Links(0)
         self.is_open = np.empty(0, bool)
 
     @classmethod
-    def of_pose(cls, pose: Pose, reach: float, turn: float) -> "Layer":
-        """Return a layer of one box: the poses within `reach` [m] and `turn` [rad] of a pose."""
-        layer = cls.__new__(cls)
-        layer.level = math.nan
-        layer._clear()
-        layer.boxes = np.array([[pose[0], pose[1], 1.0, 0.0, reach, reach, pose[2], turn]])
-        layer.up_to, layer.on, layer.total = np.zeros((3, 1))
-        layer.before, layer.after, layer.is_open = np.full(1, -1), np.full(1, -1), np.ones(1, bool)
-        return layer
+    def of_pose(cls, pose: Pose, reach: float, turn: float, level: float, square: int = -1) -> "Portal":
+        """Return a portal of one box: the poses within `reach` [m] and `turn` [rad] of a pose."""
+        portal = cls.__new__(cls)
+        portal.level, portal.squares, portal.left, portal._pieces = level, np.array([square]), 0.0, None
+        portal._clear()
+        portal.boxes = np.array([[pose[0], pose[1], 1.0, 0.0, reach, reach, pose[2], turn]])
+        portal.up_to, portal.on, portal.total = np.zeros((3, 1))
+        portal.before, portal.after, portal.is_open = Links(1), Links(1), np.ones(1, bool)
+        return portal
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -69,15 +118,20 @@ class Layer:
         self.up_to = np.concatenate([self.up_to, np.full(count, self.level)])
         self.on = np.concatenate([self.on, left[needed]])
         self.total = np.concatenate([self.total, self.level + left[needed]])
-        self.before, self.after = (np.concatenate([old, np.full(count, -1)]) for old in (self.before, self.after))
+        self.before, self.after = self.before.with_more(count), self.after.with_more(count)
         self.is_open = np.concatenate([self.is_open, np.ones(count, bool)])
+
+    def sizes(self, radius: float) -> np.ndarray:
+        """Return (n,) sizes of the boxes: by how much they turn the curves [rad]."""
+        return np.asarray(np.maximum(2 * self.boxes[:, 4] / radius, self.boxes[:, 7]))
 
     def split(self, chosen: np.ndarray, radius: float) -> np.ndarray:
         """Halve the boxes that are chosen, in length or in heading; return the new index of each old box, -1 for those."""
         halves, gradients = _halves(self.boxes[chosen], radius), np.tile(self._gradients[chosen], 2)
         kept = ~chosen
-        for name in ("boxes", "_gradients", "_left", "up_to", "on", "total", "before", "after", "is_open"):
+        for name in ("boxes", "_gradients", "_left", "up_to", "on", "total", "is_open"):
             setattr(self, name, getattr(self, name)[kept])
+        self.before, self.after = self.before.those(kept), self.after.those(kept)
         self._add(halves, gradients)
         return np.where(chosen, -1, np.cumsum(kept) - 1)
 

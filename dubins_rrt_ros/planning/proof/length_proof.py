@@ -1,16 +1,16 @@
 """A lower bound of the lengths of all paths that rises towards the length of the one that was found.
 
-Every path crosses the levels of the cost from the start in order (`level_sets.py`). So it is at least as long as the cheapest
-chain of boxes, one on each level, whose costs are lower bounds of the Dubins curves from box to box without any obstacles
-(`_kernels/interval_curves.py`). Branch and bound: boxes on chains that are cheap are halved, and where the cheapest chain leads
-through an obstacle a level is added. Chains that cost at least the length that is being proved are left out, so that the bound
-holds for all paths, whichever way round they lead. A chain may leave a box from another pose than it came to, and over many near
-levels that adds up; so it costs at least what one without some of the levels does, too. To split boxes of places and headings is
-the idea of G* (docs/bounds.md).
+Every path crosses the levels of the cost from the start in order, each in one of its portals (`level_sets.py`, `portals.py`).
+So it is at least as long as the cheapest chain of boxes, one in each portal on its way, whose costs are lower bounds of the
+Dubins curves from box to box without any obstacles (`_kernels/interval_curves.py`). Branch and bound: the largest boxes on
+chains that are cheap are halved, and where the cheapest chain leads through an obstacle a level is added. Chains that cost at
+least the length that is being proved are left out, so that the bound holds for all paths, whichever way round they lead. A
+chain may leave a box from another pose than it came to, and over many near levels that adds up; so it costs at least what one
+without some of the levels does, too. To split boxes of places and headings is the idea of G* (docs/bounds.md).
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from itertools import pairwise, takewhile
 
 import numpy as np
@@ -23,8 +23,9 @@ from ..curves.path import Path
 from ..deadline import OutOfTime, never
 from ..problem import Problem
 from ..search.cost_bounds import LengthBounds
-from .boxes import Layer
+from .boxes import Links, Portal
 from .level_sets import LevelSets
+from .portals import Edge, PortalGraph
 
 #: Shares of the length of the path by which the lengths that are proved one after the other are below it.
 GAPS = (0.5, 0.2, 0.15, 0.12, 0.1, 0.08, 0.065, 0.05, 0.04, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
@@ -35,16 +36,18 @@ CONTACT = 1.3
 #: Spacing of the poses along the path between which contacts are sought, as a share of its length and at least [m].
 POSES, LEAST_POSE_SPACING = 1 / 4000, 0.02
 #: Size of the boxes from which a chain is held against the obstacles: length in turning radii, and range of headings [rad].
-SMALL, SMALL_TURN = 0.075, 0.6
+SMALL, SMALL_TURN = 0.15, 0.4
 #: Depth by which a chain must lead into an obstacle for a level to be added, in turning radii.
-DEPTH = 0.03
+DEPTH = 0.15
 #: Share of the way from the bound to the length that is being proved up to which boxes of chains are halved in a round.
-SPLIT_SHARE = 0.6
+SPLIT_SHARE = 0.4
+#: Share of the size of the largest of these boxes down to which they are halved: smaller ones are not what lowers the bound.
+SIZE_SHARE = 0.4
 #: Maximum number of times that levels are added at first, where the shortest string over the levels leads into obstacles; their
 #: least distance from others in turning radii; and depth in shares of the required clearance.
 STRING_ROUNDS, STRING_SPACING, STRING_DEPTH = 20, 1.0, 1.0
-#: Numbers of layers back, or to the first one, from where chains are bounded without the boxes between.
-STEPS = 2, 4, 1_000_000
+#: Numbers of portals back from where chains are bounded without the boxes between.
+STEPS = (2,)
 #: Number of pairs of boxes after which `interrupted` is asked.
 PAIRS = 4096
 #: Maximum number of boxes.
@@ -76,9 +79,9 @@ class LengthProof:
         self.bound = min(self._sets.bound, self.length)
         self._limit_of_sets = limit if limit < math.inf else self.length
         self._interrupted = interrupted
-        self._layers = [Layer.of_pose(problem.start, 0.0, 0.0), *self._layers_at(self._contacts(path)),
-                        Layer.of_pose(problem.goal, problem.goal_tolerance_xy, min(problem.yaw_tolerance, math.pi))]
+        self._graph = PortalGraph(self._sets, self._limit_of_sets, Portal.of_pose(problem.start, 0.0, 0.0, 0.0), self._goal())
         self._is_stale = True
+        self._cover_contacts(path)
         for _ in range(STRING_ROUNDS):
             if interrupted() or not self._add_levels_along_string():
                 break
@@ -86,7 +89,7 @@ class LengthProof:
     @property
     def levels(self) -> np.ndarray:
         """Levels whose crossings the proof looks at, ascending [m]."""
-        return np.array([layer.level for layer in self._layers[1:-1]])
+        return self._graph.levels
 
     @property
     def sets(self) -> LevelSets:
@@ -114,15 +117,14 @@ class LengthProof:
         limits = [self.length / (1 + share) for share in (*GAPS, gap) if share >= gap and share > 0]
         return min((limit for limit in limits if limit > self.bound), default=None)
 
-    def _layer_at(self, level: float) -> Layer:
-        return Layer(self._sets, level, self._limit_of_sets)
+    def _goal(self) -> Portal:
+        problem = self._problem
+        exact = problem.goal_tolerance_xy == 0
+        return Portal.of_pose(problem.goal, problem.goal_tolerance_xy, min(problem.yaw_tolerance, math.pi), self._sets.end,
+                              self._sets.square_at(problem.goal[:2]) if exact else -1)
 
-    def _layers_at(self, levels: Iterable[float]) -> Iterator[Layer]:
-        """Return the layers at levels, one after the other, as far as there is time for them."""
-        return map(self._layer_at, takewhile(lambda _: not self._interrupted(), levels))
-
-    def _contacts(self, path: Path) -> list[float]:
-        """Return the levels where the path touches obstacles, those where it has least room first, so far as they are apart."""
+    def _cover_contacts(self, path: Path) -> None:
+        """Cover the levels where the path touches obstacles, those where it has least room first, so far as they are apart."""
         required = self._problem.vehicle.required_clearance
         points = path.poses(max(LEAST_POSE_SPACING, POSES * path.length))[:, :2]
         room, costs = self._field.at(points), self._sets.costs(points)
@@ -131,150 +133,175 @@ class LengthProof:
         for level in costs[tight[np.argsort(room[tight], kind="stable")]].tolist():
             if all(abs(level - other) > SPACING * self._radius for other in (0.0, self._sets.end, *levels)):
                 levels.append(level)
-        return sorted(level for level in levels if 0 < level < self._sets.end)
+        for level in takewhile(lambda _: not self._interrupted(), sorted(levels)):
+            if 0 < level < self._sets.end:
+                for portal in self._graph.portals_at(level):
+                    portal.cover()
+        self._graph.link()
 
     def _add_levels_along_string(self) -> bool:
-        """Add a level to each leg of the shortest string over the levels that leads deep into an obstacle; False if none does."""
-        required = self._problem.vehicle.required_clearance
-        levels = [0.0, *(layer.level for layer in self._layers[1:-1]), self._sets.end]
-        added = []
-        for (point, other), (level, following) in zip(pairwise(self._shortest_string()), pairwise(levels), strict=True):
-            rise = following - level
-            if rise < 2 * STRING_SPACING * self._radius:
+        """Add a level to each leg of the shortest string that leads deep into an obstacle; False if none does."""
+        required, margin = self._problem.vehicle.required_clearance, STRING_SPACING * self._radius
+        string, length = self._shortest_string()
+        if length >= self.length:
+            return False
+        added = False
+        for (portal, point), (following, other) in pairwise(string):
+            if following.level - portal.level < 2 * margin:
                 continue
             shares = np.linspace(0, 1, max(8, int(2 * math.dist(point, other) / required) + 2))
             room = self._field.at(point + shares[:, None] * (other - point))
             if (room < 0.5 * required).mean() * math.dist(point, other) > STRING_DEPTH * self._radius:
-                margin = STRING_SPACING * self._radius
-                added.append(level + min(max(shares[room.argmin()] * rise, margin), rise - margin))
-        self._layers[1:-1] = sorted([*self._layers[1:-1], *self._layers_at(added)], key=lambda layer: layer.level)
-        return bool(added)
+                level = _level_between(portal, following, float(shares[room.argmin()]), margin)
+                added = self._graph.cover_between(portal, following, level) or added
+        self._graph.link()
+        return added
 
-    def _shortest_string(self) -> list[np.ndarray]:
-        """Return a point for each layer: those of the shortest string over the centres of the boxes."""
-        points = [layer.boxes[:, :2] for layer in self._layers]
-        if not all(map(len, points)):
-            return [points[0][0]] * len(points)  # no path is shorter than the one that is known
-        costs, links = np.zeros(1), []
-        for source, following in pairwise(points):
-            lengths = costs[:, None] + np.hypot(*(source[:, None] - following[None]).transpose(2, 0, 1))
-            links.append(lengths.argmin(axis=0))
-            costs = lengths.min(axis=0)
-        index, string = 0, [points[-1][0]]
-        for link, source in zip(reversed(links), reversed(points[:-1]), strict=True):
-            index = int(link[index])
-            string.append(source[index])
-        return string[::-1]
+    def _shortest_string(self) -> tuple[list[tuple[Portal, np.ndarray]], float]:
+        """Return a point for each portal on the shortest string over the centres of boxes, and the string's length."""
+        start, goal = self._graph.portals[0], self._graph.portals[-1]
+        costs, links = {id(start): np.zeros(1)}, {}
+        for portal in self._graph.portals[1:]:
+            points = portal.boxes[:, :2]
+            costs[id(portal)], links[id(portal)] = np.full(len(points), math.inf), [(start, 0)] * len(points)
+            for source, least in self._graph.edges(portal):
+                if len(source) and len(points):
+                    lengths = np.hypot(*(source.boxes[:, None, :2] - points[None]).transpose(2, 0, 1))
+                    lengths = costs[id(source)][:, None] + np.maximum(lengths, least)
+                    for index in np.flatnonzero(lengths.min(axis=0) < costs[id(portal)]).tolist():
+                        links[id(portal)][index] = source, int(lengths[:, index].argmin())
+                    costs[id(portal)] = np.minimum(costs[id(portal)], lengths.min(axis=0))
+        string, portal, index = [(goal, goal.boxes[0, :2])], goal, 0
+        while portal is not start:
+            portal, index = links[id(portal)][index]
+            string.append((portal, portal.boxes[index, :2]))
+        return string[::-1], float(costs[id(goal)][0])
 
     def _reopen(self, limit: float) -> None:
-        for layer in self._layers[1:-1]:
-            layer.reopen(limit)
+        """Begin to prove a length: all boxes that chains below it may lead through are open."""
+        for portal in self._graph.portals[1:-1]:
+            portal.reopen(limit)
         self._is_stale = True
 
     def _round(self, limit: float) -> bool:
         """Bound all chains below a limit, and halve boxes of the cheapest ones; False where there is nothing more to gain."""
         self._sweep(limit, backwards=False)
-        self.bound = max(self.bound, min(limit, float(self._layers[-1].up_to[0])))
+        self.bound = max(self.bound, min(limit, float(self._graph.portals[-1].up_to[0])))
         if self.bound >= limit:
-            for layer in self._layers[1:-1]:
-                layer.total = np.maximum(layer.total, limit)
+            for portal in self._graph.portals[1:-1]:
+                portal.total = np.maximum(portal.total, limit)
             return True
         self._sweep(limit, backwards=True)
         self._is_stale = False
-        added = self._place_for_level()
+        place = self._place_for_level()
         split = self._split(self.bound + SPLIT_SHARE * (limit - self.bound), limit)
-        if added is not None:
-            self._add_level(*added)
-        return (split or added is not None) and sum(map(len, self._layers)) <= MAX_BOXES
+        if added := place is not None and self._graph.cover_between(*place):
+            self._graph.link()
+        return (split or added) and sum(map(len, self._graph.portals)) <= MAX_BOXES
 
     def _sweep(self, limit: float, backwards: bool) -> None:
         """Compute the costs of chains up to each open box, or from there on, where they are not those of the last round."""
-        layers = self._layers[::-1] if backwards else self._layers
-        changed = np.zeros(1, bool)
-        for index, layer in enumerate(layers[1:], start=1):
-            source = layers[index - 1]
-            links = layer.after if backwards else layer.before
-            due = layer.is_open & (self._is_stale | (links < 0) | changed[links] | ~source.is_open[links])
-            earlier = [layers[other] for other in sorted({max(0, index - step) for step in STEPS}) if other < index - 1]
-            changed = self._relax(source, earlier, layer, np.flatnonzero(due), limit, backwards)
+        portals = self._graph.portals[::-1] if backwards else self._graph.portals
+        changed = {id(portals[0]): np.zeros(1, bool)}
+        for portal in portals[1:]:
+            links = portal.after if backwards else portal.before
+            due = links.portals == 0
+            for edge in self._graph.edges(portal, backwards):
+                concerned = np.flatnonzero(links.portals == id(edge.portal))
+                boxes = links.boxes[concerned]
+                due[concerned] = changed[id(edge.portal)][boxes] | ~edge.portal.is_open[boxes]
+            changed[id(portal)] = self._relax(portal, np.flatnonzero(portal.is_open & (due | self._is_stale)), limit, backwards)
 
-    def _relax(self, source: Layer, earlier: list[Layer], layer: Layer, due: np.ndarray, limit: float, backwards: bool
-               ) -> np.ndarray:
-        """Compute the costs of chains to the boxes `due` of a layer; return (n,) bool, True where they changed.
+    def _relax(self, portal: Portal, due: np.ndarray, limit: float, backwards: bool) -> np.ndarray:
+        """Compute the costs of chains to the boxes `due` of a portal; return (n,) bool, True where they changed.
 
-        They cost at least what they do without the boxes between an `earlier` layer and this one: the most of these counts.
+        They cost at least what they do without the portals between some before them and this one: the most of these counts.
         """
-        changed = np.zeros(len(layer), bool)
-        costs, links = (layer.on, layer.after) if backwards else (layer.up_to, layer.before)
-        found, best = self._least_costs(source, layer, due, limit, backwards)
-        for other in earlier:
+        changed = np.zeros(len(portal), bool)
+        costs, links = (portal.on, portal.after) if backwards else (portal.up_to, portal.before)
+        found, best = self._least_costs(self._graph.edges(portal, backwards), portal, due, limit, backwards)
+        for steps in STEPS:
             below = np.flatnonzero(found < UNLIMITED)
-            found[below] = np.maximum(found[below], self._least_costs(other, layer, due[below], limit, backwards)[0])
+            cut = self._graph.cut(portal, steps, backwards)
+            found[below] = np.maximum(found[below], self._least_costs(cut, portal, due[below], limit, backwards)[0])
         changed[due] = found != costs[due]
         costs[due] = found
-        links[due] = best
+        links.portals[due], links.boxes[due] = best.portals, best.boxes
         return changed
 
-    def _least_costs(self, source: Layer, layer: Layer, due: np.ndarray, limit: float, backwards: bool
-                     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the least costs of chains from boxes of a layer to the boxes `due` of another one, and these boxes or -1."""
-        known, left = (source.on, layer.up_to) if backwards else (source.up_to, layer.on)
-        usable = np.flatnonzero(source.is_open & (known < UNLIMITED))
-        usable = usable[np.argsort(known[usable], kind="stable")]
-        found, best = np.full(len(due), UNLIMITED), np.full(len(due), -1, np.int32)
-        size = max(1, PAIRS // max(1, len(usable)))
-        for begin in range(0, len(due) if len(usable) else 0, size):
-            if self._interrupted():
-                raise OutOfTime
-            some = slice(begin, begin + size)
-            relax(known[usable], source.boxes[usable], layer.boxes[due[some]], left[due[some]], self._radius, limit, backwards,
-                  found[some], best[some])
-        return found, np.where(best >= 0, usable[best] if len(usable) else -1, -1)
+    def _least_costs(self, cut: list[Edge], portal: Portal, due: np.ndarray, limit: float, backwards: bool
+                     ) -> tuple[np.ndarray, Links]:
+        """Return the least costs of chains from boxes of a cut to the boxes `due` of a portal, and links to these boxes."""
+        left = (portal.up_to if backwards else portal.on)[due]
+        found, links = np.full(len(due), UNLIMITED), Links(len(due))
+        for source, least_edge in cut:
+            known = source.on if backwards else source.up_to
+            usable = np.flatnonzero(source.is_open & (known < UNLIMITED))
+            if not len(usable) or not len(due):
+                continue
+            usable = usable[np.argsort(known[usable], kind="stable")]
+            best = np.full(len(due), -1, np.int32)
+            size = max(1, PAIRS // len(usable))
+            for begin in range(0, len(due), size):
+                if self._interrupted():
+                    raise OutOfTime
+                some = slice(begin, begin + size)
+                relax(known[usable], source.boxes[usable], portal.boxes[due[some]], left[some], least_edge, self._radius, limit,
+                      backwards, found[some], best[some])
+            better = best >= 0
+            links.portals[better], links.boxes[better] = id(source), usable[best[better]]
+        return found, links
 
     def _split(self, up_to: float, limit: float) -> bool:
         """Halve the open boxes on chains that cost less than `up_to`; False if there are none."""
-        found = False
-        for index, layer in enumerate(self._layers[1:-1], start=1):
-            layer.close(limit)
-            chosen = layer.is_open & (layer.total < up_to)
+        found, largest = False, 0.0
+        for portal in self._graph.portals[1:-1]:
+            portal.close(limit)
+            chosen = portal.is_open & (portal.total < up_to)
+            largest = max(largest, portal.sizes(self._radius)[chosen].max(initial=0.0))
+        for portal in self._graph.portals[1:-1]:
+            chosen = portal.is_open & (portal.total < up_to) & (portal.sizes(self._radius) >= SIZE_SHARE * largest)
             found = found or bool(chosen.any())
-            new = layer.split(chosen, self._radius)
-            after, before = self._layers[index + 1], self._layers[index - 1]
-            after.before = np.where(after.before >= 0, new[after.before], -1) if len(new) else np.full(len(after), -1)
-            before.after = np.where(before.after >= 0, new[before.after], -1) if len(new) else np.full(len(before), -1)
+            new = portal.split(chosen, self._radius)
+            for edge in self._graph.edges(portal, backwards=True):
+                edge.portal.before.renumber(portal, new)
+            for edge in self._graph.edges(portal):
+                edge.portal.after.renumber(portal, new)
         return found
 
-    def _cheapest_chain(self) -> list[np.ndarray]:
-        """Return the boxes of the cheapest chain, from the start to the goal."""
-        index, boxes = 0, []
-        for layer in reversed(self._layers):
-            boxes.append(layer.boxes[index])
-            index = int(layer.before[index])
-        return boxes[::-1]
+    def _cheapest_chain(self) -> list[tuple[Portal, np.ndarray]]:
+        """Return the portals and boxes of the cheapest chain, from the start to the goal."""
+        portals = {id(portal): portal for portal in self._graph.portals}
+        portal, index = self._graph.portals[-1], 0
+        chain = [(portal, portal.boxes[0])]
+        while portal is not self._graph.portals[0]:
+            portal, index = portals[int(portal.before.portals[index])], int(portal.before.boxes[index])
+            chain.append((portal, portal.boxes[index]))
+        return chain[::-1]
 
-    def _place_for_level(self) -> tuple[int, float] | None:
-        """Return after which layer, and where, to add a level: where the cheapest chain leads farthest into an obstacle."""
-        levels = [0.0, *(layer.level for layer in self._layers[1:-1]), self._sets.end]
+    def _place_for_level(self) -> tuple[Portal, Portal, float] | None:
+        """Return between which portals to add which level: where the cheapest chain leads farthest into an obstacle."""
         deepest, place = self._problem.vehicle.required_clearance - DEPTH * self._radius, None
-        for index, (box, following) in enumerate(pairwise(self._cheapest_chain())):
-            if levels[index + 1] - levels[index] < 2 * LEAST_SPACING * self._radius or not self._are_small(box, following):
-                continue
-            room = self._least_room(box, following)
-            if room < deepest:
-                deepest, place = room, (index, (levels[index] + levels[index + 1]) / 2)
+        margin = LEAST_SPACING * self._radius
+        for (portal, box), (following, other) in pairwise(self._cheapest_chain()):
+            if following.level - portal.level >= 2 * margin and self._are_small(box, other):
+                room, share = self._least_room(box, other)
+                if room < deepest:
+                    deepest, place = room, (portal, following, _level_between(portal, following, share, margin))
         return place
 
     def _are_small(self, box: np.ndarray, other: np.ndarray) -> bool:
         return bool(box[4] + other[4] <= 2 * SMALL * self._radius and box[7] + other[7] <= 2 * SMALL_TURN)
 
-    def _least_room(self, box: np.ndarray, other: np.ndarray) -> float:
-        """Return the least clearance along the curve between the centres of two boxes [m]."""
+    def _least_room(self, box: np.ndarray, other: np.ndarray) -> tuple[float, float]:
+        """Return the least clearance along the curve between the centres of two boxes [m], and at which share of it."""
         curve = dubins.shortest((box[0], box[1], box[6]), (other[0], other[1], other[6]), self._radius)
         poses = curve.poses(max(LEAST_POSE_SPACING, curve.length / 40))
-        return float(self._field.at(np.ascontiguousarray(poses[:, :2])).min())
+        room = self._field.at(np.ascontiguousarray(poses[:, :2]))
+        return float(room.min()), float(room.argmin()) / max(1, len(room) - 1)
 
-    def _add_level(self, index: int, level: float) -> None:
-        """Add a level after layer `index`."""
-        self._layers.insert(index + 1, self._layer_at(level))
-        self._layers[index].after[:] = -1
-        self._layers[index + 2].before[:] = -1
+
+def _level_between(portal: Portal, following: Portal, share: float, margin: float) -> float:
+    """Return the level at a share of the rise from a portal to a following one, at least `margin` from both [m]."""
+    rise = following.level - portal.level
+    return portal.level + min(max(share * rise, margin), rise - margin)

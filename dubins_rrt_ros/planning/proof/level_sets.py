@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import label
 
 from .._kernels import UNLIMITED
 from ..collision.clearance import ClearanceField
@@ -21,6 +22,8 @@ from ..search.cost_to_go import CostToGo
 #: The corners (column, row) of the triangles of a square that is split along each of its diagonals.
 UPWARDS = (((0, 0), (1, 0), (1, 1)), ((0, 0), (0, 1), (1, 1)))
 DOWNWARDS = (((0, 0), (1, 0), (0, 1)), ((1, 1), (1, 0), (0, 1)))
+#: Squares that touch at a corner are connected.
+EIGHT_NEIGHBORS = np.ones((3, 3), bool)
 #: Allowance for rounding of clearances [m].
 ROUNDING = 1e-9
 
@@ -31,10 +34,16 @@ class Pieces(NamedTuple):
     Attributes:
         ends: (n, 4) x and y of both ends [m].
         gradients: (n,) directions in which the cost rises there [rad].
+        squares: (n,) indices of the squares that they are in.
     """
 
     ends: np.ndarray
     gradients: np.ndarray
+    squares: np.ndarray
+
+    def those(self, chosen: np.ndarray) -> "Pieces":
+        """Return the pieces that are chosen."""
+        return Pieces(self.ends[chosen], self.gradients[chosen], self.squares[chosen])
 
 
 class LevelSets:
@@ -54,7 +63,8 @@ class LevelSets:
         self._costs = self._from_start.kernel.nodes()
         self._least, self._most = _least_of_corners(self._costs), -_least_of_corners(-self._costs)
         self._is_free = field.free_squares(self._required_clearance).is_free[:-1, :-1] != 0
-        self._total = self._least + _least_of_corners(self._to_goal.kernel.nodes())
+        self._least_left = _least_of_corners(self._to_goal.kernel.nodes())
+        self._total = self._least + self._least_left
         self.end = self._cost_at_goal(problem)
         self.bound = max(float(self._to_goal.at(np.array([problem.start[:2]]))[0]), self.end)
 
@@ -99,20 +109,56 @@ class LevelSets:
             level = math.nextafter(level, 0)
         is_crossed = (self._least < level) & (self._most >= level) & (self._most < UNLIMITED) & (self._total < limit)
         rows, columns = np.nonzero(is_crossed & self._is_free)
-        ends, gradients = self._segments(rows, columns, level)
+        ends, gradients, squares = self._segments(rows, columns, level)
         frame = self._field.frame
         side = self._from_start.kernel.side
         both = frame.to_map((ends.reshape(-1, 2) - 1) * side).reshape(-1, 4)
-        return Pieces(both, wrap(gradients + frame.yaw))
+        return Pieces(both, wrap(gradients + frame.yaw), squares)
 
-    def _segments(self, rows: np.ndarray, columns: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the segments in squares, as (n, 4) columns and rows of their ends, and the directions of the gradients."""
+    def components(self, low: float, high: float, limit: float) -> np.ndarray:
+        """Return the labels of all squares by connected parts of those with costs from `low` to `high`.
+
+        A path shorter than `limit` keeps to one label while its costs are in this range.
+        """
+        meets = (self._least <= high) & (self._most >= low) & (self._total < limit) & self._is_free
+        labels = np.zeros(meets.shape, np.int32)
+        rows, columns = np.flatnonzero(meets.any(axis=1)), np.flatnonzero(meets.any(axis=0))
+        if len(rows):
+            part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+            label(meets[part], EIGHT_NEIGHBORS, output=labels[part])
+        return labels.ravel()
+
+    def square_at(self, point: tuple[float, float]) -> int:
+        """Return the index of the square that holds a point."""
+        column, row = np.floor(self._field.frame.from_map(np.array([point]))[0] / self._from_start.kernel.side + 1).astype(int)
+        return int(row * self._least.shape[1] + column)
+
+    def least_left_in(self, squares: np.ndarray) -> float:
+        """Return a lower bound of the way to the goal from all of some squares [m]."""
+        return float(self._least_left.ravel()[squares].min())
+
+    def _segments(self, rows: np.ndarray, columns: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the segments in squares, as (n, 4) columns and rows of their ends, the gradients' directions, the squares."""
         corners = {(x, y): self._costs[rows + y, columns + x] for x in (0, 1) for y in (0, 1)}
         upwards, downwards = _squared_slopes(corners)
-        found = [_in_triangle(rows[mask], columns[mask], [(*corner, corners[corner][mask]) for corner in triangle], level)
+        squares = rows * self._least.shape[1] + columns
+        found = [_in_triangle(rows[mask], columns[mask], squares[mask],
+                              [(*corner, corners[corner][mask]) for corner in triangle], level)
                  for mask, triangles in ((upwards <= downwards, UPWARDS), (upwards > downwards, DOWNWARDS))
                  for triangle in triangles]
-        return np.concatenate([ends for ends, _ in found]), np.concatenate([gradients for _, gradients in found])
+        ends, gradients, inside = (np.concatenate(each) for each in zip(*found, strict=True))
+        return ends, gradients, inside
+
+    def portals(self, level: float, limit: float) -> list[Pieces]:
+        """Return the connected parts of a level set, as far as paths shorter than `limit` may cross it."""
+        pieces = self.pieces(level, limit)
+        columns = self._least.shape[1]
+        rows_columns = np.divmod(pieces.squares, columns)
+        holds = np.zeros(self._least.shape, bool)
+        holds[rows_columns] = True
+        labels, count = label(holds, EIGHT_NEIGHBORS)
+        of_pieces = labels[rows_columns]
+        return [pieces.those(of_pieces == number) for number in range(1, count + 1)]
 
     def least_left(self, points: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Return (n,) lower bounds of the way to the goal [m] from within `reach` [m] of (n, 2) points, along level sets."""
@@ -136,9 +182,9 @@ def _squared_slopes(corners: dict[tuple[int, int], np.ndarray]) -> tuple[np.ndar
     return np.maximum(bottom + side, left + top), np.maximum(bottom + left, top + side)
 
 
-def _in_triangle(rows: np.ndarray, columns: np.ndarray, corners: list[tuple[int, int, np.ndarray]],
-                 level: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a level crosses a triangle of each square: (n, 4) columns and rows of both ends, and the gradients."""
+def _in_triangle(rows: np.ndarray, columns: np.ndarray, squares: np.ndarray, corners: list[tuple[int, int, np.ndarray]],
+                 level: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where a level crosses a triangle of each square: (n, 4) columns and rows of both ends, gradients, and squares."""
     values = np.stack([value for _, _, value in corners])
     xs, ys = np.array([x for x, _, _ in corners], float), np.array([y for _, y, _ in corners], float)
     below = values < level
@@ -155,4 +201,5 @@ def _in_triangle(rows: np.ndarray, columns: np.ndarray, corners: list[tuple[int,
     rise1, rise2 = values[1] - values[0], values[2] - values[0]
     x1, y1, x2, y2 = xs[1] - xs[0], ys[1] - ys[0], xs[2] - xs[0], ys[2] - ys[0]
     turn = x1 * y2 - x2 * y1
-    return np.stack(ends, axis=1), np.arctan2((x1 * rise2 - x2 * rise1) / turn, (rise1 * y2 - rise2 * y1) / turn)
+    gradients = np.arctan2((x1 * rise2 - x2 * rise1) / turn, (rise1 * y2 - rise2 * y1) / turn)
+    return np.stack(ends, axis=1), gradients, squares[crossed]
