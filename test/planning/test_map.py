@@ -128,6 +128,28 @@ def test_polygons_of_bounds_and_obstacles(bounds, obstacles):
     assert PolygonMap.of(bounds).free.area == 60
 
 
+def ring(x, y, radius, corners=3000):
+    angles = np.linspace(0, math.tau, corners, endpoint=False)
+    return shapely.Polygon(np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)]))
+
+
+APART = [ring(x, y, 0.9) for x in (1, 3, 5, 7) for y in (1, 3)]
+
+
+@pytest.mark.parametrize(("bounds", "obstacles"), [
+    (shapely.box(0, 0, 10, 6), APART), (shapely.box(0, 0, 10, 6) - ring(3, 5, 0.5), APART),
+    (shapely.box(0, 0, 10, 6), [*APART, ring(3, 3, 0.5)]), (shapely.box(0, 0, 10, 6), [*APART, ring(20, 3, 0.5)]),
+    (shapely.box(0, 0, 10, 6) - ring(3, 5, 0.5), [*APART, ring(3, 5, 0.2)]),
+    (shapely.box(0, 0, 10, 6) - ring(3, 5, 0.2), [*APART, ring(3, 5, 0.5)]),
+    (shapely.box(0, 0, 10, 6), [*APART[1:], APART[0] - ring(1, 1, 0.5)]), (shapely.box(0, 0, 10, 6), [*APART, ring(6.5, 3, 1)]),
+    (shapely.MultiPolygon([shapely.box(0, 0, 10, 6), ring(20, 3, 1)]), APART), (ring(4, 2, 2), APART)],
+    ids=["apart", "bounds with a hole", "nested", "outside", "in a hole", "around a hole", "hollow", "crossing", "two bounds",
+         "across the bounds"])
+def test_obstacles_of_many_corners_are_taken_from_the_bounds(bounds, obstacles):
+    free = PolygonMap.of(bounds, obstacles).free
+    assert free.is_valid and free.equals(bounds - shapely.union_all(obstacles))
+
+
 def test_a_path_goes_around_the_obstacles_of_polygons():
     problem = Problem(PolygonMap.of(SQUARE, [WALL]), Vehicle(turning_radius=0.5), (1, 1, 0), (9, 1, 0))
     assert 9.5 < plan(problem, Settings(seed=1)).length < 11

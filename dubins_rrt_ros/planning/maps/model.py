@@ -213,10 +213,14 @@ class PolygonMap(_PlottableMap):
     Attributes:
         free: the free space, a valid shapely Polygon or MultiPolygon in metres; holes and the outside are obstacles.
         name: where it came from, for messages; by keyword alone.
+
+    Args:
+        known_valid: True if the free space is known to be valid, which takes seconds to find out for 100,000 vertices.
     """
 
     free: shapely.Geometry
     name: str = field(default="polygons", kw_only=True)
+    known_valid: InitVar[bool] = field(default=False, kw_only=True)
 
     #: The costs of cells: polygons have none.
     costs = None
@@ -225,7 +229,7 @@ class PolygonMap(_PlottableMap):
         """Return this map."""
         return self
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, known_valid: bool) -> None:
         _check_name(self.name)
         if not isinstance(self.free, shapely.Geometry):
             raise MapError(f"{self.name}: the free space is {quoted(self.free)}; give a shapely Polygon or MultiPolygon, or "
@@ -234,7 +238,7 @@ class PolygonMap(_PlottableMap):
             raise MapError(f"{self.name}: the free space is a {self.free.geom_type} without area; "
                            "give a Polygon or MultiPolygon")
         check_size(self.free, f"{self.name}: the free space")
-        if not shapely.is_valid(self.free):
+        if not (known_valid or shapely.is_valid(self.free)):
             raise MapError(f"{self.name}: the free space is no valid polygon ({shapely.is_valid_reason(self.free)}); "
                            "mend its rings")
         if not np.isfinite(shapely.bounds(self.free)).all():
@@ -258,7 +262,7 @@ class PolygonMap(_PlottableMap):
             MapError: one of them is no valid polygon, or the obstacles leave no free space.
         """
         free = free_space(polygon_of(bounds, "the bounds polygon"), polygons_of(obstacles, "obstacle"), "polygons")
-        return cls(free, name=name)
+        return cls(free, name=name, known_valid=True)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the bounding rectangle, counter-clockwise [m]; read-only."""
@@ -275,7 +279,7 @@ class PolygonMap(_PlottableMap):
         return _digest(shapely.to_wkb(self.free, byte_order=1))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(PolygonMap, name=self.name), (self.free,)  # so that they are prepared for threads again
+        return partial(PolygonMap, name=self.name, known_valid=True), (self.free,)  # so that they are prepared for threads again
 
 
 Map = GridMap | PolygonMap

@@ -40,7 +40,8 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
         found = ", ".join(label for label, _ in bounds[:5]) or "none"
         raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
     _refuse_degrees(bounds[0][1], bounds[0][0])
-    return PolygonMap(free_space(bounds[0][1], [geometry for _, geometry in obstacles], "features"), name=name)
+    return PolygonMap(free_space(bounds[0][1], [geometry for _, geometry in obstacles], "features"), name=name,
+                      known_valid=True)
 
 
 def parse_wkt(text: str, name: str) -> PolygonMap:
@@ -70,7 +71,7 @@ def parse_wkt(text: str, name: str) -> PolygonMap:
     if shapely.is_empty(valid(free, "geometry")):
         raise MapError("geometry is empty; give a polygon with an area")
     _refuse_degrees(free, "geometry")
-    return PolygonMap(free, name=name)
+    return PolygonMap(free, name=name, known_valid=True)
 
 
 def _refuse_degrees(bounds: shapely.Geometry, label: str) -> None:
