@@ -66,12 +66,17 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
         message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
     if problem.is_free:
         message += f"; is_free was asked every {problem.fine_spacing:g} m along it, and not between"
+    return f"{message}{end_clause(problem, path)}."
+
+
+def end_clause(problem: Problem, path: Path) -> str:
+    """Return how far from the goal a path ends, as a clause; "" where it has to end there exactly."""
     if problem.exact_goal:
-        return message + "."
+        return ""
     off, turned = position_error(path.end, problem.goal), heading_error(path.end, problem.goal)
     if problem.any_goal_heading:
-        return f"{message}; it ends {off:.3f} m from the goal, with the heading {path.end[2]:.3f} rad."
-    return f"{message}; it ends {off:.3f} m and {turned:.3f} rad from the goal."
+        return f"; it ends {off:.3f} m from the goal, with the heading {path.end[2]:.3f} rad"
+    return f"; it ends {off:.3f} m and {turned:.3f} rad from the goal"
 
 
 def not_audited_message(path: Path) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ._kernels import COMPILED
-from .answer import defect_message, not_audited_message
+from .answer import defect_message, end_clause, not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
 from .curves.angles import wrap
@@ -28,7 +28,7 @@ from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
-from .search.hybrid_astar import HybridAStarRuns
+from .search.hybrid_astar import HybridAStarRuns, goal_poses
 from .search.known_path import KnownPath
 from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
@@ -97,10 +97,18 @@ class _Call:
         self._rng = np.random.default_rng((settings.seed, 4))  # the numbers that Smoother.simplify draws too, no others
         self._failures: dict[int, Plan] = {}  # by the id of the leg
         self._time_to_first: float | None = None
+        self._aim = self._free_goal()
+
+    def _free_goal(self) -> Pose:
+        """Return the goal; if that is not free, the nearest free pose within its tolerances, where there is one."""
+        checker = self.world.field.collision_checker(self._problem.vehicle)
+        poses = goal_poses(self._problem, checker).tolist()
+        x, y, theta = next(filter(checker.is_pose_free, poses), self._problem.goal)
+        return x, y, theta
 
     def answer(self) -> Plan:
         """Choose the headings, plan the legs, and join them."""
-        stops = list(stops_of(self._problem, self._waypoints))
+        stops = list(stops_of(replace(self._problem, goal=self._aim), self._waypoints))
         if len(stops) < 3:
             return self._single_leg(stops)
         if not self.world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
@@ -313,7 +321,7 @@ class _Call:
             self._time_to_first = self._clock.elapsed
         count = len(self._waypoints)
         message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
-                   f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s.")
+                   f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s{end_clause(self._problem, path)}.")
         bound = min(self._lower_bound(), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
@@ -349,23 +357,34 @@ class _Call:
             return self._plan(Status.CANCELLED, "Cancelled before a first path.", root, cancelled=True)
         x, y, _ = stop.poses[0]
         name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
-        status, why = found.status, f"On the way to {name} at ({x:.3f}, {y:.3f}): {found.message}"
-        of_all_headings = found.problem.start == self._problem.start and found.problem.any_goal_heading
-        is_proof = (of_all_headings or all(yaw is not None for _, _, yaw in self._waypoints)
-                    or are_separated(found.problem, self.world.field))
-        if found.status == Status.TIMEOUT or (found.status == Status.NO_VALID_PATH and not is_proof):
-            # What is proved of one heading at a waypoint is not proved of all; and a leg has but a part of the time.
+        status, place = found.status, f"{name} at ({x:.3f}, {y:.3f})"
+        why = f"On the way to {place}: {found.message}"
+        if found.status == Status.TIMEOUT or (found.status == Status.NO_VALID_PATH and not self._is_of_all_ends(found.problem)):
+            # What is found out about one heading at a waypoint need not hold for all; and a leg has but a part of the time.
             status = Status.TIMEOUT
-            limit = self._settings.planning_time
-            why = f"On the way to {name} at ({x:.3f}, {y:.3f}): No path within planning_time {limit:g} s; allow more time."
+            reason = found.message.partition("; ")[2] if self._has_all_headings(found.problem) else ""
+            why = (f"On the way to {place}: No path within planning_time {self._settings.planning_time:g} s, and waypoints take "
+                   f"more of it than a goal alone; {reason or 'allow more time.'}")
         elif found.path:
             status = Status.TIMEOUT
-            why = f"No path reaches {name} at ({x:.3f}, {y:.3f}) with a heading that leads on; allow more planning_time."
+            why = f"No path reaches {place} with a heading that leads on; allow more planning_time, waypoints take more of it."
         elif found.message.startswith("Start "):
             why = found.message
         elif found.message.startswith("Goal "):
             why = found.message.replace("Goal", name[0].upper() + name[1:], 1)
         return self._plan(status, why, root, location=found.location)
+
+    def _has_all_headings(self, leg: Problem) -> bool:
+        """Return True if a leg was planned with all headings that its ends may have."""
+        given = [self._problem.start, *self._waypoints] + [self._problem.goal] * self._problem.exact_goal
+        return leg.start in given and (leg.any_goal_heading or leg.goal in given)
+
+    def _is_of_all_ends(self, leg: Problem) -> bool:
+        """Return True if there is no path between any poses that the ends of a leg may be, as there is none between its own."""
+        is_last = leg.goal[:2] == self._aim[:2]
+        tolerance = self._problem.goal_tolerance_xy if is_last else 0.0
+        return (tolerance == 0 and self._has_all_headings(leg)) or are_separated(replace(leg, goal_tolerance_xy=tolerance),
+                                                                                 self.world.field)
 
     def _plan(self, status: Status, message: str, tree: Tree, **more: Any) -> Plan:
         return Plan(status, message, self._problem, self._settings, tree, time_to_first=self._time_to_first,

@@ -165,6 +165,34 @@ def test_a_leg_that_fails_names_its_waypoint(world, place, status, words):
     assert answer.waypoints == ((*BELOW, None), (*place, None), (*ABOVE, None))
 
 
+@pytest.mark.parametrize("first", [(3.0, 3.0), (3.0, 3.0, 0.0)], ids=["any heading", "a heading"])
+def test_a_start_that_no_arc_leaves_is_a_proof_whatever_headings_follow(first):
+    cells = np.zeros((40, 40), np.int8)
+    cells[:, 22] = 100
+    before_a_wall = Problem(GridMap(cells, 0.5), Vehicle(1.0, 0.3), (10.2, 10.0, 0.0), (3.0, 8.0, 0.0))
+    answer = plan_through(before_a_wall, [first, (6.0, 6.0)], SETTINGS)
+    assert answer.status == Status.NO_VALID_PATH
+    assert "On the way to waypoint 1 at (3.000, 3.000): No path exists: every forward arc from the start" in answer.message
+
+
+@pytest.mark.parametrize("heading", [(math.pi,), ()], ids=["a heading", "any heading"])
+def test_a_leg_without_a_path_tells_why_where_that_holds_of_all_headings(heading):
+    cells = np.full((60, 200), 100, np.int8)
+    cells[18:42] = 0
+    corridor = Problem(GridMap(cells, 0.1), Vehicle(1.5, 0.3), (10.0, 3.0, 0.0), (2.0, 3.0, math.pi))
+    answer = plan_through(corridor, [(5.0, 3.0, *heading)], replace(SETTINGS, informed=False))  # ended by samples, not by time
+    assert answer.status == Status.TIMEOUT
+    assert answer.message.startswith("On the way to waypoint 1 at (5.000, 3.000): No path within planning_time 120 s, and ")
+    assert "; no curve of the turning radius 1.5 m left the start; " in answer.message
+
+
+@pytest.mark.parametrize("options", [{"goal_tolerance_xy": 0.5}, {"goal_tolerance_xy": 0.5, "any_goal_heading": True}])
+def test_a_goal_that_is_not_free_is_reached_within_its_tolerance(world, options):
+    answer = through(world, (3.0, 3.0), goal=(5.0, 3.85, 0.0), **options)
+    assert_passed(answer, (3.0, 3.0))
+    assert "it ends 0." in answer.message
+
+
 def test_a_start_that_is_occupied_is_named(world):
     answer = through(world, BELOW, ABOVE, start=IN_THE_BOX)
     assert answer.status == Status.START_OCCUPIED
