@@ -274,8 +274,7 @@ class GoalSession:
         self._forget_failure()
         if self._goal is not None and outcome.cure:
             self._failure = outcome
-            self._warn(outcome.status, f"Waiting for a {outcome.cure}: the goal stands, and is planned again when one comes. "
-                                       f"{outcome.message}")
+            self._warn(outcome.status, outcome.waiting_message)
             if "transform" in outcome.cure or (self._frames.follows_vehicle and "start" in outcome.cure):
                 _restart(self._retry_timer, TRANSFORM_INTERVAL)
 

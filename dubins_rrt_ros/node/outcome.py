@@ -15,6 +15,8 @@ from .request import Refusal
 CURES = {Status.NO_MAP: "map", Status.NO_START: "start", Status.TF_ERROR: "transform", Status.GOAL_OUTSIDE_MAP: "map",
          Status.GOAL_OCCUPIED: "map", Status.START_OUTSIDE_MAP: "map or a start", Status.START_OCCUPIED: "map or a start",
          Status.NO_VALID_PATH: "map or a start", Status.TIMEOUT: "map or a start"}
+#: Failures for lack of what can cure them; of any other there is one already, with which it failed.
+MISSING = (Status.NO_MAP, Status.NO_START, Status.TF_ERROR)
 
 
 class Outcome(NamedTuple):
@@ -36,6 +38,14 @@ class Outcome(NamedTuple):
     def cure(self) -> str:
         """The inputs that can cure this failure, in words; "" where there are none."""
         return "" if self.is_final else CURES.get(self.status, "")
+
+    @property
+    def waiting_message(self) -> str:
+        """The sentence that says what this failure waits for, and why."""
+        present = "ones" if " or " in self.cure else "one"
+        why = ("the goal stands, and is planned when one comes" if self.status in MISSING
+               else f"the goal failed with the present {present}, and is planned again when another comes")
+        return f"Waiting for a {self.cure}: {why}. {self.message}"
 
 
 def outcome_of(result: Plan | Exception, node: Node) -> Outcome:

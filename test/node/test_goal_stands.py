@@ -127,7 +127,8 @@ def test_a_failure_is_told_first_then_once_what_is_waited_for_and_it_is_tried_ag
     first, second = drive.events(plan_id)
     assert first[:2] == (DiagnosticStatus.ERROR, "NO_VALID_PATH")
     assert second[:2] == (DiagnosticStatus.WARN, "NO_VALID_PATH")
-    assert second[2].startswith("Waiting for a map or a start: ")
+    assert second[2] == ("Waiting for a map or a start: the goal failed with the present ones, and is planned again when another "
+                         f"comes. {first[2]}")
     assert drive.ends[-1] is None
     drive.show(FREE)
     client.status_of(int(plan_id), error_name="NONE")

@@ -61,8 +61,10 @@ class DemoClient:
         self._node = rclpy.create_node("dubins_rrt_demo", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        for kind, topic in ((OccupancyGrid, "map"), (PathMessage, "plan"), (DiagnosticStatus, "planner/status")):
+        self._failure = ""  # the first one's sentence; a warning may follow that says what the goal waits for
+        for kind, topic in ((OccupancyGrid, "map"), (PathMessage, "plan")):
             self._subscribe(kind, topic)
+        self._subscribe(DiagnosticStatus, "planner/status", depth=10)
         self._start, self._goal = (self._node.create_publisher(PoseStamped, topic, 1)
                                    for topic in ("start_pose", "goal_pose"))
         return self
@@ -91,10 +93,14 @@ class DemoClient:
         return Answer(figures, grid_from(self._latest["map"], FRAME, MAX_MAP_CELLS), self._path(),
                       _segments(self._latest["planner/tree"]))
 
-    def _subscribe(self, kind: type, topic: str) -> None:
+    def _subscribe(self, kind: type, topic: str, depth: int = 1) -> None:
         """Keep the latest message of a topic, from before the subscription too."""
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._node.create_subscription(kind, topic, lambda message: self._latest.__setitem__(topic, message), latched)
+        def keep(message: Any) -> None:
+            self._latest[topic] = message
+            if isinstance(message, DiagnosticStatus) and message.level == DiagnosticStatus.ERROR:
+                self._failure = self._failure or message.message
+
+        self._node.create_subscription(kind, topic, keep, QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL))
 
     def _wait(self, condition: Callable[[], bool], missing: str) -> None:
         """Serve the topics until the condition holds."""
@@ -121,7 +127,7 @@ class DemoClient:
 
     def _check_path(self) -> None:
         if self._values()["error_code"] != "0":
-            raise DemoError(f"no path: {self._latest['planner/status'].message}")
+            raise DemoError(f"no path: {self._failure or self._latest['planner/status'].message}")
 
     def _path(self) -> np.ndarray:
         return np.array([pose_from("plan", pose) for pose in self._latest["plan"].poses]).reshape(-1, 3)
