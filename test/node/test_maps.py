@@ -179,7 +179,10 @@ def test_a_map_that_changes_during_a_request_is_checked_when_it_ends(replanning)
 def test_a_refused_map_leaves_the_path_alone_and_is_told_once(replanning):
     process, client = replanning
     show_path(client, process)
+    still_free = "The map changed; the published path is free on it too"
+    checks = process.output.count(still_free)
     publish(client, process, HARMLESS)
+    client.wait_for(lambda: process.output.count(still_free) > checks, "the check of the path on the map before")
     told, shown = len(client.statuses), len(client.paths)
     for _ in range(3):  # as a map that is published at 1 Hz comes
         client.publish_map(occupancy(CLOSED, frame="odom"))
