@@ -171,7 +171,8 @@ class _Call:
         search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
                         self._report_samples)
         self._objective = search.objective
-        self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over, search.objective.is_length)
+        self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over, self._bound,
+                                      search.objective.is_length)
         for step, may_end in enumerate(() if deadline.is_due else search.run(self._usable_seed(field, search.growing.nearest))):
             if step == STEPS_TO_PROOF and search.best < 0 and (trapped := self._trapped(search, field)):
                 return trapped

@@ -9,7 +9,7 @@ from support.cases import needs_compiled, random_maps, random_problem, scaled
 
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan, prepare
 from dubins_rrt_ros.planning._kernels.dubins import shortest_lengths
-from dubins_rrt_ros.planning._kernels.interval_curves import bounds_between, shortest_of_intervals
+from dubins_rrt_ros.planning._kernels.interval_curves import bounds_between, relax, shortest_of_intervals
 from dubins_rrt_ros.planning.deadline import never
 from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
@@ -74,6 +74,21 @@ def test_no_curve_between_boxes_is_shorter():
         out = np.empty(1)
         bounds_between(boxes[:1], boxes[1:], radius, out)
         assert out[0] <= lengths_between(*(poses_in(box, rng, 400) for box in boxes), radius).min() + 1e-9
+
+
+def test_no_chain_below_the_limit_is_left_out():
+    """A quicker bound that is above it ends the look at two boxes; it must not be above a curve either."""
+    rng = np.random.default_rng(7)
+    for _ in range(scaled(600, least=10)):
+        angles, radius = rng.uniform(-4, 4, 4), rng.uniform(0.2, 1)
+        boxes = np.array([[*rng.uniform(-3, 3, 2), math.cos(angle), math.sin(angle), *rng.uniform(0, [0.2, 0.1]), heading,
+                           rng.uniform(0, 0.4)] for angle, heading in (angles[:2], angles[2:])])
+        limit = lengths_between(*(poses_in(box, rng, 400) for box in boxes), radius).min() + 1e-8
+        for backwards in (False, True):
+            sources, others = (boxes[1:], boxes[:1]) if backwards else (boxes[:1], boxes[1:])
+            out, best = np.full(1, 1e300), np.empty(1, np.int32)
+            relax(np.zeros(1), sources, others, np.zeros(1), 0.0, radius, limit, backwards, out, best)
+            assert best[0] == 0 and out[0] < limit
 
 
 def poses_in(box, rng, number):
@@ -268,6 +283,16 @@ def test_with_a_preferred_clearance_a_stop_gap_is_one_of_the_cost(maze):
     result = plan(maze, Settings(seed=1, samples=10_000_000, planning_time=60.0, preferred_clearance=-1.0, stop_gap=0.1))
     assert result.cost_gap <= 0.1 + 1e-9
     assert result.planning_time < 60 and "proved to be at most " in result.message
+
+
+@needs_compiled
+def test_a_path_that_is_the_dubins_curve_needs_no_proof(monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 2)
+    monkeypatch.setattr(PROOFS, "start", never)
+    problem = island()
+    straight = Problem(problem.world, start=(1.0, 1.0, 0.0), goal=(11.0, 1.0, 0.0))
+    result = plan(straight, Settings(seed=1, samples=300, planning_time=60.0))
+    assert result.gap < 1e-6 and result.samples == 300
 
 
 def test_on_one_core_nothing_is_proved_without_a_gap_to_stop_at(maze, monkeypatch):

@@ -139,6 +139,21 @@ def shortest_of_intervals(distance: cython.double, start: cython.double, start_h
 
 @cython.cfunc
 @cython.nogil
+@cython.inline
+@cython.exceptval(check=False)
+def least_turn(distance: cython.double, off: cython.double) -> cython.double:
+    """Return the length of a turn of radius 1 and a straight line to a point, where the heading is `off` its direction [rad].
+
+    No curve that begins, or backwards ends, farther off is shorter. The point is at least 2 away, so that no turn goes around it.
+    """
+    dx: cython.double = distance - sin(off)
+    dy: cython.double = cos(off)
+    far: cython.double = hypot(dx, dy)
+    return off - atan2(dy, dx) + asin(min(1.0, 1 / far)) + sqrt(max(0.0, far * far - 1))
+
+
+@cython.cfunc
+@cython.nogil
 @cython.exceptval(check=False)
 def least_between(ax: cython.double, ay: cython.double, au: cython.double, av: cython.double, al: cython.double,
                   aw: cython.double, a: Interval, bx: cython.double, by: cython.double, bu: cython.double, bv: cython.double,
@@ -166,8 +181,15 @@ def least_between(ax: cython.double, ay: cython.double, au: cython.double, av: c
     line: cython.double = atan2(dy, dx)
     least: cython.double = distance / hypot(distance + along, across)
     scaled: cython.double = least * radius
-    image: cython.double = scaled * least_curve(distance / scaled, Interval(a.middle - line, min(PI, a.half + turn)),
-                                                Interval(b.middle - line, min(PI, b.half + turn)))
+    start: Interval = Interval(a.middle - line, min(PI, a.half + turn))
+    end: Interval = Interval(b.middle - line, min(PI, b.half + turn))
+    off: cython.double = max(fabs(remainder(start.middle, TWO_PI)) - start.half, fabs(remainder(end.middle, TWO_PI)) - end.half)
+    image: cython.double
+    if off > 0 and distance >= 2 * scaled:
+        image = scaled * least_turn(distance / scaled, off)
+        if image * nearest >= limit * distance:
+            return image * nearest / distance * (1 - ROUNDING)
+    image = scaled * least_curve(distance / scaled, start, end)
     return max(nearest, image * nearest / distance) * (1 - ROUNDING)
 
 

@@ -24,14 +24,15 @@ class BackgroundProof:
     """
 
     def __init__(self, problem: Problem, field: ClearanceField, settings: Settings, interrupted: Callable[[], bool],
-                 is_length: bool = True):
+                 bound: float, is_length: bool):
         """Prepare it; `follow` starts it.
 
         Args:
+            bound: length that no path falls below [m]: a path that is as short needs no proof.
             interrupted: asked every few milliseconds, from another thread; True ends the proof with the bound so far.
             is_length: True if the search minimises the length, so that a `stop_gap` is one of the length.
         """
-        self._problem, self._field, self._interrupted = problem, field, interrupted
+        self._problem, self._field, self._interrupted, self._least = problem, field, interrupted, bound
         self._waits = settings.stop_gap > 0 and is_length
         self._gap = settings.stop_gap if self._waits else NEGLIGIBLE_GAP
         self._is_beside = settings.length_proof and settings.informed and COMPILED and cores() > 1
@@ -49,7 +50,7 @@ class BackgroundProof:
         self._length = min(path.length, self._length)
         if self._proof:
             self._proof.length = self._length
-        elif self._job is None and (self._waits or self._is_beside) and may_start:
+        elif self._job is None and (self._waits or self._is_beside) and may_start and not self.holds:
             self._job = PROOFS.start(self._run, path, bounds)
 
     def _run(self, path: Path, bounds: LengthBounds | None) -> None:
@@ -65,7 +66,7 @@ class BackgroundProof:
     @property
     def bound(self) -> float:
         """Length that no path falls below, as far as it is proved [m]."""
-        return self._proof.bound if self._proof else 0.0
+        return max(self._least, self._proof.bound) if self._proof else self._least
 
     @property
     def holds(self) -> bool:
