@@ -13,7 +13,8 @@ from types import FrameType
 from typing import Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan, plan_through
-from dubins_rrt_ros.planning.problem import DoubtfulYaw, Waypoint, checked_waypoint, doubt_about_yaw
+from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw, doubt_about_yaw
+from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
 from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, write_proof
@@ -150,7 +151,7 @@ def _pose(arguments: argparse.Namespace, name: str, numbers: Sequence[float]) ->
     x, y, yaw = numbers
     if "degrees" in arguments:
         return [x, y, math.radians(yaw)]
-    if doubt := doubt_about_yaw((x, y, yaw)):
+    if doubt := doubt_about_yaw(yaw):
         print(f"dubins_rrt plan: warning: {flag(name)} has {doubt} --degrees takes degrees", file=sys.stderr)
     return [x, y, yaw]
 

@@ -21,7 +21,7 @@ from .vehicle import Vehicle
 from .work import WorkDone
 
 #: Settings that a document of an earlier version lacks, as that version planned.
-BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0, "cost_weight": 0.0}
+BEFORE = {"preferred_clearance": 0.0, "clearance_weight": 0.0, "cost_weight": 0.0, "stop_gap": 0.0, "length_proof": False}
 
 #: Keys of the functions that a document names.
 HOOKS = ("is_free", "sampler")

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from .errors import PlanningError
 from .hooks import IsFree, check_function
-from .maps.frame import LARGEST_YAW
+from .maps.frame import LARGEST_YAW, DoubtfulYaw, doubt_about_yaw
 from .maps.model import GridMap, Map, PolygonMap
 from .option import OptionError, convert_options, documented, option
 from .text import quoted
@@ -24,10 +24,6 @@ Waypoint = tuple[float, float, float | None]
 
 class InvalidPose(PlanningError, ValueError):
     """A pose that is none; the message says which and why."""
-
-
-class DoubtfulYaw(UserWarning):
-    """A warning: a yaw beyond a full turn, which is taken, but was likely meant in degrees."""
 
 
 class PreparedMap(Protocol):
@@ -86,6 +82,8 @@ class Problem:
                  start_slack: float = 0.0, world: PreparedMap | None = None, is_free: IsFree | None = None):
         """Take `map` and `vehicle`, or a World in their place; a `world` that is not of just these is left out."""
         if not isinstance(map, GridMap | PolygonMap):
+            if not hasattr(map, "vehicle") or not hasattr(map, "map"):
+                raise TypeError(f"the map is {quoted(map)}; give a GridMap, a PolygonMap or a World; load_map reads files")
             _check_fit(map, vehicle, allow_unknown)
             world = map
             map, vehicle, allow_unknown = world.map, world.vehicle, world.allow_unknown  # noqa: A001
@@ -102,7 +100,7 @@ class Problem:
             object.__setattr__(self, name, value)
         convert_options(self)
         for name, pose in (("start", self.start), ("goal", self.goal)):
-            if doubt := doubt_about_yaw(pose):
+            if doubt := doubt_about_yaw(pose[2]):
                 warnings.warn(f"the {name} pose has {doubt}", DoubtfulYaw, stacklevel=2)
 
     @property
@@ -131,12 +129,6 @@ def _check_fit(world: PreparedMap, vehicle: Vehicle | None, allow_unknown: bool)
         raise OptionError("the world is prepared for another vehicle; leave the vehicle out, or give world.for_vehicle(vehicle)")
     if allow_unknown and not world.allow_unknown:
         raise OptionError("allow_unknown is true, but the world is prepared without it; prepare one with allow_unknown=True")
-
-
-def doubt_about_yaw(pose: Pose) -> str:
-    """Return what is doubtful about a pose's yaw, in words; "" where nothing is."""
-    yaw = pose[2]
-    return f"the yaw {yaw:g} rad; did you mean {math.radians(yaw):.5g}?" if math.tau < abs(yaw) <= LARGEST_YAW else ""
 
 
 def checked_pose(name: str, pose: Sequence[float]) -> Pose:

@@ -112,6 +112,15 @@ def test_the_poses_of_a_plan_are_judged_for_they_are_driven(document, capsys):
         assert status == 1 and says in out, says
 
 
+def test_a_plan_of_an_earlier_version_is_judged(document, capsys):
+    later = {"stop_gap", "length_proof", "preferred_clearance", "clearance_weight", "cost_weight", "start_slack"}
+    old = document | {"settings": {name: value for name, value in document["settings"].items() if name not in later}}
+    assert run(write(old), "hall.wkt", capsys=capsys)[0] == 0
+    wrong = [[x, y - 3.0 if 0 < index < len(old["poses"]) - 1 else y, yaw] for index, (x, y, yaw) in enumerate(old["poses"])]
+    status, out, _ = run(write(old | {"poses": wrong}), "hall.wkt", capsys=capsys)
+    assert status == 1 and "poses are off" in out
+
+
 def test_every_joint_of_a_plan_is_among_its_poses(document, capsys):
     settings = document["settings"] | {"path_spacing": 1.0}
     without = document["poses"][::3] + document["poses"][-1:] * (len(document["poses"]) % 3 != 1)
@@ -150,7 +159,8 @@ def test_what_is_not_judged_is_named(document, capsys):
     file = write(document | {"colour": "red"})
     status, out, _ = run(file, "hall.wkt", "--json", "verdict.json", capsys=capsys)
     named = ["message", "found_by", "samples", "tree_nodes", "time_to_first", "time_to_found", "planning_time", "map_time",
-             "lower_bound (that no path is shorter)", "cost_lower_bound (that no path costs less)", "map", "version", "colour"]
+             "lower_bound (that no path is shorter)", "cost_lower_bound (that no path costs less)", "work", "map", "version",
+             "colour"]
     assert status == 0 and out.endswith(f"Not judged: {', '.join(named)}.\n")
     assert json.loads(Path("verdict.json").read_text())["not_judged"] == named
     status, out, _ = run(file, "hall.wkt", "--robot-radius", "0.25", capsys=capsys)

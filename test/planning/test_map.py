@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, plan
-from dubins_rrt_ros.planning.maps.errors import MapError
-from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, GridMap, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
+from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
+from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, DoubtfulGrid, GridMap, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
 
@@ -70,6 +72,43 @@ def test_cells_that_are_understood(data, cells):
 def test_cells_that_may_be_meant_otherwise_are_refused_with_the_remedy(data, remedy):
     with pytest.raises(MapError, match=remedy):
         GridMap(data, 1.0)
+
+
+@pytest.mark.parametrize("data, remedy", [
+    (np.ma.masked_array([[0, 0]], [[False, True]]), "cells are masked; .* such as data.filled"),
+    (np.zeros((4, 5, 3), np.uint8), r"shape \(4, 5, 3\) have not rows and columns alone"), (np.zeros(5), "give .rows, columns.")])
+def test_cells_that_a_grid_has_no_values_for_are_refused(data, remedy):
+    with pytest.raises(MapError, match=remedy):
+        GridMap(data, 1.0)
+    assert GridMap(np.ma.masked_array([[0, 100]], False), 1.0).data.tolist() == [[0, 100]]
+
+
+def test_a_truth_value_is_no_resolution():
+    with pytest.raises(MapMetadataError, match="resolution is True"):
+        GridMap([[0, 100]], True)
+
+
+def test_a_grid_of_small_numbers_is_taken_with_a_warning():
+    with pytest.warns(DoubtfulGrid, match="no value above 2, which stands for 2 % and is free"):
+        GridMap([[0, 1, 2]], 1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for data, percent in (([[0, 1, 2]], True), ([[0, 10]], False), ([[0, 0]], False), ([[-1, 100]], False)):
+            GridMap(data, 1.0, percent=percent)
+
+
+def test_an_origin_in_degrees_is_taken_with_a_warning():
+    with pytest.warns(DoubtfulYaw, match="the origin has the yaw 90 rad; did you mean 1.5708?"):
+        grid = GridMap([[0, 100]], 1.0, (0, 0, 90))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        grid.window((0.5, 0.5), 3.0)
+
+
+@pytest.mark.parametrize("given", ["maze", np.zeros((4, 4)), None], ids=["name", "array", "none"])
+def test_what_is_no_map_is_refused_by_a_problem(given):
+    with pytest.raises(TypeError, match="give a GridMap, a PolygonMap or a World; load_map reads files"):
+        Problem(given, Vehicle(), (0, 0, 0), (1, 0, 0))
 
 
 def test_one_percent_is_taken_where_percent_is_said():

@@ -132,6 +132,18 @@ def test_unknown_space_that_is_free_by_its_threshold_is_told(tmp_path, mode):
     assert taken.describe_cells() == "50.0% free, 25.0% occupied, 25.0% unknown"
 
 
+@pytest.mark.parametrize("changes, doubt", [
+    ({"origin": "[0, 0, 45]"}, "m.yaml: the origin has the yaw 45 rad; did you mean 0.7854?"),
+    ({"mod": "scale"}, "m.yaml: the field 'mod' is passed over; did you mean mode?"),
+    ({"Resolution": "0.2"}, "m.yaml: the field 'Resolution' is passed over; did you mean resolution?"),
+    ({"occupied_threshold": "0.5"}, "m.yaml: the field 'occupied_threshold' is passed over; did you mean occupied_thresh?"),
+    ({"unknown_grey": "205"}, "m.yaml: unknown_grey is no field of map files and is passed over; give it as a parameter, or by "
+     "--unknown-grey"),
+    ({"frame_id": "odom"}, None)], ids=lambda value: None if isinstance(value, str | None) else next(iter(value)))
+def test_what_is_likely_a_slip_in_a_map_file_is_told(tmp_path, changes, doubt):
+    assert load_map(write_grid(tmp_path, **changes)).warnings == ((doubt,) if doubt else ())
+
+
 @pytest.mark.parametrize("rows, changes", [
     ([[205, 0, 254]], {}), ([[204, 0, 254]], {"free_thresh": "0.25"}), ([[205, 100]], {"mode": "raw", "free_thresh": "0.25"}),
     ([[205, 0]], {"negate": "1", "free_thresh": "0.25"})])

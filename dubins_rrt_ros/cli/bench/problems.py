@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Problem, Settings, Vehicle, checked_pose, options
-from dubins_rrt_ros.planning.problem import doubt_about_yaw
+from dubins_rrt_ros.planning.maps.frame import doubt_about_yaw
 from dubins_rrt_ros.planning.text import one_line, quoted
 from dubins_rrt_ros.planning.vehicle import overridden
 
@@ -78,7 +78,7 @@ def _doubts(entries: list[dict[str, Any]], cases: list[Case]) -> Iterator[str]:
         yield f"{name} has no effect, as {by} takes its place, in {count} problem{'' if count == 1 else 's'}"
     for case in cases:
         for name, pose in (("start", case.start), ("goal", case.goal)):
-            if doubt := doubt_about_yaw(pose):
+            if doubt := doubt_about_yaw(pose[2]):
                 yield f"problem {case.name}: its {name} has {doubt}"
 
 

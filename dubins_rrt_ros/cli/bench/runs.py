@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Problem, Progress, Settings, Vehicle, World, load_map, plan, prepare
-from dubins_rrt_ros.planning.problem import DoubtfulYaw
+from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
 
 from ..common.cluster import connected, place
 from ..common.parser import UsageError

@@ -33,7 +33,7 @@ from dubins_rrt_ros.planning.audit.cost import COST_ERROR, cost_of
 from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_gap
 from dubins_rrt_ros.planning.audit.sweep import pose_gaps
 from dubins_rrt_ros.planning.curves.dubins import shortest
-from dubins_rrt_ros.planning.problem import DoubtfulYaw
+from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
 
 from .problems import AMPLE_TIME, MANY_SAMPLES, Trial, random_trial
 

@@ -10,6 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 LARGEST_YAW = 1e6
 
 
+class DoubtfulYaw(UserWarning):
+    """A warning: a yaw beyond a full turn, which is taken, but was likely meant in degrees."""
+
+
+def doubt_about_yaw(yaw: float) -> str:
+    """Return what is doubtful about a yaw [rad], in words; "" where nothing is."""
+    return f"the yaw {yaw:g} rad; did you mean {math.radians(yaw):.5g}?" if math.tau < abs(yaw) <= LARGEST_YAW else ""
+
+
 class Frame(NamedTuple):
     """A frame, by where its origin is in the map's frame and how far it is turned.
 

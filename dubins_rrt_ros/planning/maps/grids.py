@@ -1,8 +1,9 @@
 """Read and write grids as map_server does: a YAML file, and the image that it names."""
 
+import difflib
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 from ..text import quoted
 from .brightness import FREE_GREY, MODES, OCCUPIED_GREY, UNKNOWN_GREY, Rules, cells_of
 from .errors import MapError, MapMetadataError
+from .frame import doubt_about_yaw
 from .images import Picture, read_image
 from .model import GridMap
 from .opening import ReadOptions, check_inside, located, opened, read_text
@@ -21,6 +23,12 @@ from .yaml import RepeatedKey, load_plain
 PICTURE_ENDINGS = (".png", ".pgm", ".bmp")
 #: Longest YAML file that is read [bytes].
 MAX_YAML_BYTES = 16 * 2**10
+
+#: The fields that are read; map_server passes over others, too.
+FIELDS = "image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode", "unknown_grey"
+
+#: How alike the name of another field must be to one of these, from 0 to 1, to be taken for a slip.
+LEAST_ALIKE = 0.75
 
 _FLAGS = {**dict.fromkeys(("0", "false", "no", "off"), False), **dict.fromkeys(("1", "true", "yes", "on"), True)}
 
@@ -74,7 +82,20 @@ def load_grid(path: Path, options: ReadOptions) -> GridMap:
     except MapError as error:
         raise type(error)(f"image {image!r} {error}") from None
     cells, warnings = cells_of(picture, Rules(mode, negate, occupied, free), options.unknown_grey)
-    return GridMap(cells, resolution, origin, path.name, percent=True, warnings=warnings)
+    doubts = [f"{path.name}: {doubt}" for doubt in _doubts(fields, origin[2])]
+    return GridMap(cells, resolution, origin, path.name, percent=True, warnings=(*doubts, *warnings))
+
+
+def _doubts(fields: dict[str, Any], yaw: float) -> Iterator[str]:
+    """Yield what was most likely meant otherwise than it is taken."""
+    if doubt := doubt_about_yaw(yaw):
+        yield f"the origin has {doubt}"
+    if "unknown_grey" in fields:
+        yield "unknown_grey is no field of map files and is passed over; give it as a parameter, or by --unknown-grey"
+    for name in fields:
+        near = difflib.get_close_matches(str(name).lower(), FIELDS, 1, LEAST_ALIKE)
+        if near and name not in FIELDS:
+            yield f"the field {quoted(str(name))} is passed over; did you mean {near[0]}?"
 
 
 def load_picture(path: Path, options: ReadOptions) -> GridMap:

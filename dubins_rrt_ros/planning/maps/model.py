@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import warnings as python_warnings
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property, partial
@@ -13,7 +14,7 @@ import shapely
 from ..pictures import Plottable, check_matplotlib
 from ..text import quoted
 from .errors import MapError, MapMetadataError
-from .frame import LARGEST_YAW, Frame
+from .frame import LARGEST_YAW, DoubtfulYaw, Frame, doubt_about_yaw
 from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, polygons_of
 
 if TYPE_CHECKING:
@@ -65,6 +66,14 @@ DEFAULT_THRESHOLDS = Thresholds()
 FINEST, FARTHEST = 1e-4, 1e8
 
 
+#: Highest value of a grid [%] from which it is taken for percent without a doubt.
+LEAST_PERCENT = 10
+
+
+class DoubtfulGrid(UserWarning):
+    """A warning: a grid whose values are taken for percent, but may be numbers for kinds of cells."""
+
+
 class _PlottableMap(Plottable):
     """A base of maps, with their pictures."""
 
@@ -109,19 +118,24 @@ class GridMap(_PlottableMap):
 
     def __post_init__(self, percent: bool) -> None:
         _check_name(self.name)
+        if np.ma.is_masked(self.data):
+            raise MapError(f"{self.name}: cells are masked; give the values that they stand for, such as data.filled(-1)")
         data = np.array(self.data, order="C")
-        if data.ndim != 2 or data.size == 0:
+        if data.ndim != 2:
+            raise MapError(f"{self.name}: cells of shape {data.shape} have not rows and columns alone; give (rows, columns)")
+        if data.size == 0:
             raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
         data = _percentages(data, self.name)
-        if not percent and data.max() == 1:
-            raise MapError(f"{self.name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
-                           "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
+        if not percent:
+            _check_meaning(int(data.max()), self.name)
         resolution, origin = _checked_resolution(self.resolution, self.name), _checked_origin(self.origin, self.name)
         rows, columns = data.shape
         if resolution < FINEST or max(map(abs, (*origin[:2], rows * resolution, columns * resolution))) > FARTHEST:
             raise MapMetadataError(f"{self.name}: cells of {resolution:g} m, {columns} x {rows} of them from ({origin[0]:g}, "
                                    f"{origin[1]:g}) on, cannot be planned on; give metres, cells of {FINEST:g} m at least and "
                                    f"coordinates up to {FARTHEST:g} m")
+        if not percent and (doubt := doubt_about_yaw(origin[2])):
+            python_warnings.warn(f"{self.name}: the origin has {doubt}", DoubtfulYaw, stacklevel=3)
         object.__setattr__(self, "data", _read_only(data))
         object.__setattr__(self, "resolution", resolution)
         object.__setattr__(self, "origin", origin)
@@ -290,9 +304,19 @@ def _check_name(name: Any) -> None:
         raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
 
 
+def _check_meaning(highest: int, name: str) -> None:
+    """Refuse a grid that is most likely one of 0 and 1, and warn of one that may be of small numbers for kinds of cells."""
+    if highest == 1:
+        raise MapError(f"{name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
+                       "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
+    if 1 < highest < LEAST_PERCENT:
+        python_warnings.warn(f"{name}: cells hold no value above {highest}, which stands for {highest} % and is free; give 100 "
+                             "for an obstacle and -1 for unknown, or percent=True", DoubtfulGrid, stacklevel=4)
+
+
 def _checked_resolution(resolution: Any, name: str) -> float:
     try:
-        number = float(resolution)
+        number = math.nan if isinstance(resolution, bool | np.bool_) else float(resolution)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not 0 < number < math.inf:
