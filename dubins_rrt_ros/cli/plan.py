@@ -10,10 +10,11 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from types import FrameType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, Vehicle, plan, plan_through
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw, doubt_about_yaw
+from dubins_rrt_ros.planning.plan_file import repeating
 from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
 from dubins_rrt_ros.planning.vehicle import overridden
 
@@ -24,6 +25,9 @@ from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
 from .common.request import MAP_FLAGS, LoadedRequest, add_map_arguments, map_options, read_map, read_replay
+
+if TYPE_CHECKING:
+    from dubins_rrt_ros.planning.pictures.animation import Recording
 
 #: Where the poses of a car are, for the help.
 REFERENCE_POINT = ("Poses are of the vehicle's reference point; a car's is the middle of its rear axle, for which the turning "
@@ -97,17 +101,16 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.certificate and request.waypoints:
         raise UsageError("a path through waypoints has no certificate; leave --via out")
     checked_map = certifiable_map(request.problem, request.map_name) if arguments.certificate else None
-    watch = _Watch(request.settings, is_animation(arguments.plot))
-    with _interrupt() as cancel, watch.shown() as on_progress:
+    with _interrupt() as cancel, _shown(request.settings) as on_progress:
         if request.waypoints:
             answer = plan_through(request.problem, request.waypoints, request.settings, cancel=cancel, on_progress=on_progress)
         else:
-            answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress, report_samples=watch.samples)
+            answer = plan(request.problem, request.settings, cancel=cancel, on_progress=on_progress)
     answer = replace(answer, map_time=answer.map_time + request.load_time)
     _report(answer, request, words_for(arguments.json))
     _write(answer, request.map_name, arguments)
     if arguments.plot:
-        watch.draw(arguments.plot, answer)
+        _draw(arguments.plot, answer)
     if checked_map and answer.path:
         claim = write_proof(arguments.certificate, answer, checked_map, arguments.gap, arguments.seconds)
         print(claim, file=words_for(arguments.json))
@@ -172,39 +175,42 @@ def _interrupt() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-class _Watch:
-    """What follows a search: a bar on a terminal, and a recording where it is to be an animation."""
+@contextlib.contextmanager
+def _shown(settings: Settings) -> Iterator[Callable[[Progress], None]]:
+    """Show on a terminal how many samples are drawn, with the best length and the time limit."""
+    limit = f"limit {settings.planning_time:g} s"
+    with progress_bar(settings.samples, " samples", limit) as move:
+        def show(progress: Progress) -> None:
+            best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
+            move(progress.samples, f"{best}, {limit}")
 
-    def __init__(self, settings: Settings, is_animation: bool):
-        self._settings, self._recording = settings, None
-        #: Number of samples from one frame to the next, 0 without an animation.
-        self.samples = 0
-        if is_animation:
-            from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
-            self.samples = max(1, settings.samples // MOST_FRAMES)
-            self._recording = Recording(self.samples)
+        yield show
 
-    @contextlib.contextmanager
-    def shown(self) -> Iterator[Callable[[Progress], None]]:
-        """Show on a terminal how many samples are drawn, with the best length and the time limit."""
-        limit = f"limit {self._settings.planning_time:g} s"
-        with progress_bar(self._settings.samples, " samples", limit) as move:
-            def show(progress: Progress) -> None:
-                best = "searching" if progress.length is None else f"path {progress.length:.2f} m"
-                move(progress.samples, f"{best}, {limit}")
-                if self._recording:
-                    self._recording(progress)
 
-            yield show
+def _draw(file: str, answer: Plan) -> None:
+    """Draw the answer, or the search."""
+    if not is_animation(file):
+        from dubins_rrt_ros.planning.pictures.drawing import draw_plan  # here, since matplotlib takes longer than most plans
+        draw_plan(file, answer)
+        return
+    recording = _recorded(answer)
+    with progress_bar(recording.frames, " frames") as move:
+        recording.save(file, answer, lambda done: move(done, ""))
 
-    def draw(self, file: str, answer: Plan) -> None:
-        """Draw the answer, or the search."""
-        if self._recording is None:
-            from dubins_rrt_ros.planning.pictures.drawing import draw_plan  # here, since matplotlib takes longer than most plans
-            draw_plan(file, answer)
-            return
-        with progress_bar(self._recording.frames, " frames") as move:
-            self._recording.save(file, answer, lambda done: move(done, ""))
+
+def _recorded(answer: Plan) -> "Recording":
+    """Return a recording of the search, which is done again up to where it ended: recording takes time, which would change it."""
+    from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
+    samples = max(1, answer.samples // MOST_FRAMES)
+    recording = Recording(samples)
+    if answer.work:  # over waypoints there is none, and nothing but the answer is shown
+        with _shown(answer.settings) as show:
+            def follow(progress: Progress) -> None:
+                show(progress)
+                recording(progress)
+
+            plan(answer.problem, repeating(answer.settings, answer.work), on_progress=follow, report_samples=samples)
+    return recording
 
 
 def _write(answer: Plan, map_name: str, arguments: argparse.Namespace) -> None:

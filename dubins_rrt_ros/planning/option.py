@@ -4,6 +4,7 @@ The command line's flags, the node's parameters and the documentation are derive
 """
 
 import dataclasses
+import math
 import sys
 import textwrap
 from collections.abc import Callable
@@ -86,10 +87,16 @@ class Option(NamedTuple):
             return self.text_form.read(value)
         value = plain_number(value)
         if not self._takes(value):
-            raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}")
+            raise OptionError(f"{self.name} is {quoted(value)}; it takes {self.allowed()}: {self.help}{self._in_degrees(value)}")
         if self.type is list:
             return tuple(value)
         return float(value) if self.type is float else value
+
+    def _in_degrees(self, value: Any) -> str:
+        """Ask whether an angle was meant that is out of range in radians, and not in degrees."""
+        if self.unit != "rad" or not is_number(value) or not self._takes(radians := math.radians(value)):
+            return ""
+        return f"; did you mean {radians:.4g} ({value:g} degrees)?"
 
     def _takes(self, value: Any) -> bool:
         if self.type is list:

@@ -108,11 +108,20 @@ def read_request(document: Mapping[str, Any], world_map: Map, *, is_free: IsFree
     start, goal = (checked_pose(name, _triple(_field(document, name, list), name)) for name in ("start", "goal"))
     problem = Problem(world_map, vehicle, start, goal, **request, is_free=is_free)
     fields = _known(Settings, BEFORE | fields, "settings")
-    settings = Settings(**fields | {"planning_time": MAX_PLANNING_TIME, "stop_gap": 0.0, "sampler": sampler})
+    settings = Settings(**fields | {"sampler": sampler})
     drawn = _field(document, "samples", int)
     if document.get("work") is not None:
-        return problem, replace(settings, work_limits=_work(document["work"]))
-    return problem, replace(settings, samples=drawn or settings.samples)
+        return problem, repeating(settings, _work(document["work"]))
+    return problem, replace(_untimed(settings), samples=drawn or settings.samples)
+
+
+def repeating(settings: Settings, work: WorkDone) -> Settings:
+    """Return the settings with which the same work is done again, whatever time it takes."""
+    return replace(_untimed(settings), work_limits=work)
+
+
+def _untimed(settings: Settings) -> Settings:
+    return replace(settings, planning_time=MAX_PLANNING_TIME, stop_gap=0.0)
 
 
 def _work(units: Any) -> WorkDone:

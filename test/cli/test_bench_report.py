@@ -156,10 +156,11 @@ def test_a_report_as_latex_has_the_cells_of_the_markdown():
     rows, _ = report(runs)
     assert main(["bench", "--report", runs, "--out", "report.tex"]) == 0
     text = Path("report.tex").read_text()
-    assert text.count(r"\begin{tabular}{lrrrrrrrrrrr}") == 3 and text.count(r"\bottomrule") == 4
-    assert " & ".join(["a", *rows["yard", "a"]]) + r" \\" in text.splitlines()
+    assert text.count(r"\begin{tabular}{lrr") == 3 and text.count(r"\bottomrule") == 4
+    lines = [line.removesuffix(r" \\").split(" & ") for line in text.split(r"\begin{table}")[2].splitlines() if " & " in line]
+    assert list(zip(*lines, strict=True))[1:] == [(name, *rows["yard", name]) for name in ("a", "b")]
     assert r"\caption{a \& b\_c. Best known: 9.0000 m" in text
-    assert r"50 \% \{x\}\textasciitilde{}\textasciicircum{}\textbackslash{}\$\# & 1/1" in text
+    assert r"planner & 50 \% \{x\}\textasciitilde{}\textasciicircum{}\textbackslash{}\$\# \\" in text
 
 
 @pytest.mark.parametrize(("text", "says"), [

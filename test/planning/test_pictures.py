@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from support.cases import empty_map
 
-from dubins_rrt_ros.planning import PictureError, Problem, Settings, Vehicle, pictures, plan
+from dubins_rrt_ros.planning import PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
 from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
 
@@ -152,3 +152,12 @@ def test_a_video_is_encoded_or_ffmpeg_is_asked_for(tmp_path, monkeypatch):
 def test_of_many_frames_some_are_left_out():
     recording, _, _ = recorded(samples=2 * MOST_FRAMES, every=1)
     assert recording.frames == MOST_FRAMES
+
+
+def test_a_tour_shows_its_waypoints_and_counts_them():
+    axes = matplotlib.figure.Figure().add_subplot()
+    waypoints = [(-3.0, 2.0), (2.0, -1.0, 0.0), (-3.0, 2.0)]
+    result = plan_through(problem_here(), waypoints, Settings(samples=20, planning_time=60.0, seed=1))
+    result.plot(axes)
+    assert " m over 3 waypoints, " in axes.get_title()
+    assert {"1, 3", "2"} <= {text.get_text() for text in axes.texts}

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import json
+import os
 import sys
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -172,10 +173,12 @@ def _measure_node(arguments: argparse.Namespace) -> int:
 
 
 def _written(file: str, measured: Generator[dict[str, Any], None, None], count: int) -> list[dict[str, Any]]:
-    """Write lines of JSON as they come, and return them."""
-    lines = []
-    with open(file, "w", encoding="utf-8") as out, contextlib.closing(measured):
+    """Write lines of JSON as they come, and return them. What the file had is kept until there is one."""
+    lines: list[dict[str, Any]] = []
+    with open(file, "a", encoding="utf-8") as out, contextlib.closing(measured):
         for line in with_bar(measured, count, " requests"):
+            if not lines and os.path.isfile(file):
+                out.truncate(0)
             out.write(json.dumps(line, allow_nan=False) + "\n")
             out.flush()
             lines.append(line)

@@ -11,6 +11,8 @@ from ..common.output import finite
 from .records import Best, Runs
 from .report import EXPLANATION, TITLE, Section, sections, to_document, to_markdown
 
+#: Maximum number of planners in a table in LaTeX: with the names of the figures, what a text of 12 cm takes.
+COLUMNS = 3
 _LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
           **{character: f"\\{character}" for character in "&%$#_{}"}}
 
@@ -43,15 +45,19 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def to_latex(runs: Runs, best: Mapping[str, Best]) -> str:
     """Write the tables of the report in LaTeX, for the package booktabs."""
     comments = [f"% {line}" for line in f"{TITLE}; needs \\usepackage{{booktabs}}.\n{EXPLANATION}".splitlines()]
-    return "\n".join([*comments, *map(_latex_table, sections(runs, best))]) + "\n"
+    return "\n".join([*comments, *(table for section in sections(runs, best) for table in _latex_tables(section))]) + "\n"
 
 
-def _latex_table(section: Section) -> str:
-    head, *rows = (" & ".join(map(_escaped, row)) + r" \\" for row in (section.head, *section.rows))
+def _latex_tables(section: Section) -> Iterator[str]:
+    """Yield a section's table with a column for each planner, as pages are narrow, in parts of a few columns."""
+    names, *rows = zip(section.head, *section.rows, strict=True)
     caption = f"{section.title}. {section.text.replace('**', '')}"  # bold in Markdown
-    return "\n".join([r"\begin{table}", r"\centering", rf"\caption{{{_escaped(caption)}}}",
-                      rf"\begin{{tabular}}{{l{'r' * (len(section.head) - 1)}}}", r"\toprule", head, r"\midrule", *rows,
-                      r"\bottomrule", r"\end{tabular}", r"\end{table}"])
+    for first in range(1, len(names), COLUMNS):
+        head, *lines = (" & ".join(map(_escaped, (row[0], *row[first:first + COLUMNS]))) + r" \\" for row in (names, *rows))
+        yield "\n".join([
+            r"\begin{table}", r"\centering", r"\small", rf"\caption{{{_escaped(caption if first == 1 else section.title)}}}",
+            rf"\begin{{tabular}}{{l{'r' * len(names[first:first + COLUMNS])}}}", r"\toprule", head, r"\midrule", *lines,
+            r"\bottomrule", r"\end{tabular}", r"\end{table}"])
 
 
 def _escaped(text: str) -> str:

@@ -53,11 +53,12 @@ def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS
 def _reader_of(ending: str, options: ReadOptions) -> Read:
     if ending in PICTURE_ENDINGS:
         return load_picture
-    if options.resolution is not None:
-        raise MapError(f"a {ending} file says itself how large its cells are, and resolution is {options.resolution:g}; leave "
-                       "that out")
     reader = READERS.get(OTHER_ENDINGS.get(ending, ending))
     if reader is None:
         *most, last = MAP_ENDINGS
-        raise MapError(f"the ending {ending!r} is of no known kind of map; give a {', '.join(most)} or {last} file")
+        raise MapError(f"the ending {ending!r} is of no known kind of map; give a {', '.join(most)} or {last} file, or a picture "
+                       f"({', '.join(PICTURE_ENDINGS)}) with its resolution; other pictures have to be converted to PNG")
+    if options.resolution is not None:
+        raise MapError(f"a {ending} file says itself how large its cells are, and resolution is {options.resolution:g}; leave "
+                       "that out")
     return reader.read

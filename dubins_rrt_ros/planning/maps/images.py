@@ -77,7 +77,8 @@ def read_image(file: BinaryIO, max_cells: int) -> Picture:
         return _read_png(file, max_cells)
     if magic.startswith(b"BM"):
         return _read_bmp(file, max_cells)
-    raise MapError("is no PGM (P2, P5), PNG or BMP; convert it to one of them")
+    raise MapError("has not the content of a PGM (P2, P5), PNG or BMP; save or convert it as one of them, which a new name alone "
+                   "does not do")
 
 
 def _check_size(width: int, height: int, max_cells: int) -> None:

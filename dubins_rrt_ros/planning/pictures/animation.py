@@ -16,13 +16,29 @@ from string import Template
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from . import ANIMATIONS, VIDEO, check_ffmpeg
-from .drawing import BOTTOM, LEFT, PATH, RIGHT, Drawing, draw_map, draw_path, draw_poses, draw_tree, frame, of_plan, view
+from .drawing import (
+    BOTTOM,
+    LEFT,
+    PATH,
+    RIGHT,
+    Drawing,
+    draw_map,
+    draw_path,
+    draw_poses,
+    draw_tree,
+    draw_waypoints,
+    frame,
+    of_plan,
+    view,
+)
 
 if TYPE_CHECKING:
     from ..result import Plan, Progress
@@ -139,14 +155,18 @@ class _Screen:
 
     def pictures(self, frames: Sequence[Frame]) -> Iterator[Image.Image]:
         """Yield the pictures of frames, in order."""
+        # What all frames share is drawn once: map, axes and labels take most of the time.
+        canvas = FigureCanvasAgg(self._figure)
+        canvas.draw()
+        shared, artists = canvas.copy_from_bbox(self._figure.bbox), set(self._map.get_children())
         for shown in frames:
-            artists = set(self._map.get_children())
             self._show(shown)
-            pixels = io.BytesIO()
-            self._figure.savefig(pixels, format="rgba", dpi=DPI)
-            width, height = self._figure.canvas.get_width_height()
-            yield Image.frombytes("RGBA", (width, height), pixels.getvalue()).convert("RGB")
-            for artist in set(self._map.get_children()) - artists:
+            canvas.restore_region(shared)
+            changed = set(self._map.get_children()) - artists
+            for artist in (*sorted(changed, key=Artist.get_zorder), *self._lines, self._title):
+                artist.draw(canvas.get_renderer())
+            yield Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+            for artist in changed:
                 artist.remove()
 
     def _show(self, shown: Frame) -> None:
@@ -154,6 +174,7 @@ class _Screen:
         draw_tree(self._map, drawing.tree)
         draw_path(self._map, drawing.vehicle, drawing.path)
         draw_poses(self._map, drawing.start, drawing.goal, drawing.vehicle)
+        draw_waypoints(self._map, drawing.waypoints)
         past = [one for one in self._frames if one.samples <= shown.samples]
         samples = [one.samples for one in past]
         self._lines[0].set_data(samples, [np.nan if one.length is None else one.length for one in past])

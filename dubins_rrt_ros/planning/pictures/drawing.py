@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path as Contour
 from matplotlib.transforms import Affine2D
 
 from ..maps.model import GridMap, Map
+from ..problem import Waypoint
 from ..vehicle import Vehicle
 from .outlines import body, contour, swept
 
@@ -30,6 +32,8 @@ ROOM_COLOURS = LinearSegmentedColormap.from_list("room", [TIGHT, ROOMY])
 DPI = 160
 #: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
+#: Colour of waypoints, and length of the line along the heading of one, from its middle [pt].
+WAYPOINT, POINTER = "#8a4f7d", 20.0
 #: Opacity of the area that the vehicle sweeps.
 SWEPT = 0.18
 #: Height of a line below the title [inch], and number of its letters to the inch.
@@ -49,6 +53,7 @@ class Drawing(NamedTuple):
         subtitle: the other figures.
         location: (x, y) of what keeps a path from being there [m], or None.
         rooms: (n,) room at the poses of the path, in preferred clearances, which colours it; None for one colour.
+        waypoints: (x, y, theta) of each waypoint, theta None where the path passes it with any heading and there is no path.
     """
 
     map: Map
@@ -61,6 +66,7 @@ class Drawing(NamedTuple):
     subtitle: str
     location: tuple[float, float] | None = None
     rooms: np.ndarray | None = None
+    waypoints: Sequence[Waypoint] = ()
 
 
 def draw_plan(file: str, plan: "Plan") -> None:
@@ -74,14 +80,22 @@ def of_plan(plan: "Plan") -> Drawing:
     title, subtitle = _captions(plan)
     return Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
                    plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location,
-                   plan.rooms())
+                   plan.rooms(), _passed(plan))
+
+
+def _passed(plan: "Plan") -> list[Waypoint]:
+    """Return the waypoints, with the headings in which a path passes them."""
+    if plan.path is None:
+        return list(plan.waypoints)
+    thetas = plan.poses()[list(plan.waypoint_indices), 2].tolist()
+    return [(x, y, theta) for (x, y, _), theta in zip(plan.waypoints, thetas, strict=True)]
 
 
 def _captions(plan: "Plan") -> tuple[str, str]:
     name = planner_title(plan.settings.planner)
     if plan.length is None or plan.gap is None or plan.time_to_first is None:
         return f"{name}: no path, {plan.status.name}", plan.message
-    return (path_title(plan.settings.planner, plan.length, plan.gap),
+    return (path_title(plan.settings.planner, plan.length, plan.gap, len(plan.waypoints)),
             figures_title(plan.samples, plan.time_to_first, plan.planning_time))
 
 
@@ -90,9 +104,10 @@ def planner_title(planner: str) -> str:
     return {"rrt": "RRT", "rrt_star": "RRT*"}[planner]
 
 
-def path_title(planner: str, length: float, gap: float) -> str:
-    """Return the title of a picture of a path."""
-    return f"{planner_title(planner)}: {length:.2f} m, at most {100 * gap:.1f} % above the shortest"
+def path_title(planner: str, length: float, gap: float, waypoints: int = 0) -> str:
+    """Return the title of a picture of a path over so many waypoints."""
+    over = f" over {waypoints} waypoint{'' if waypoints == 1 else 's'}" if waypoints else ""
+    return f"{planner_title(planner)}: {length:.2f} m{over}, at most {100 * gap:.1f} % above the shortest"
 
 
 def figures_title(samples: int, time_to_first: float, planning_time: float) -> str:
@@ -117,6 +132,7 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     draw_tree(axes, drawing.tree)
     draw_path(axes, drawing.vehicle, drawing.path, drawing.rooms)
     draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
+    draw_waypoints(axes, drawing.waypoints)
     if drawing.location is not None:
         axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
 
@@ -138,6 +154,20 @@ def draw_poses(axes: Axes, start: Sequence[float], goal: Sequence[float], vehicl
     sideways = max(1.3 * vehicle.inscribed_radius, 0.3 * arrow)
     _draw_name(axes, "start", start, START, -max(1.1 * size, sideways), sideways)
     _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * size), max(1.1 * arrow, sideways))
+
+
+def draw_waypoints(axes: Axes, waypoints: Sequence[Waypoint]) -> None:
+    """Draw a numbered disc at each waypoint, and a line along its heading; those at one place share a disc."""
+    numbers: dict[tuple[float, float], list[str]] = {}
+    for number, (x, y, theta) in enumerate(waypoints, 1):
+        numbers.setdefault((x, y), []).append(str(number))
+        if theta is not None:
+            tip = (POINTER * math.cos(theta), POINTER * math.sin(theta))
+            axes.annotate("", (x, y), tip, textcoords="offset points", zorder=7,
+                          arrowprops={"arrowstyle": "<|-", "color": WAYPOINT, "shrinkA": 0, "shrinkB": 0})
+    for (x, y), names in numbers.items():
+        axes.annotate(", ".join(names), (x, y), color="white", fontsize=9, weight="bold", ha="center", va="center", zorder=8,
+                      bbox={"boxstyle": "circle,pad=0.25", "facecolor": WAYPOINT, "edgecolor": "white"})
 
 
 def decorate(axes: Axes) -> None:
@@ -192,12 +222,12 @@ def _draw_grid(axes: Axes, grid: GridMap, free: str) -> None:
     axes.axis(view)
 
 
-def draw_tree(axes: Axes, segments: np.ndarray) -> LineCollection:
+def draw_tree(axes: Axes, segments: np.ndarray) -> None:
     """Draw (m, 2, 2) line segments of the edges of a tree."""
     # As pixels in vector formats too, where a hundred thousand lines would be slow to open.
-    lines = LineCollection(list(segments), colors=TREE, linewidths=0.5, rasterized=True, zorder=2)
-    axes.add_collection(lines)
-    return lines
+    edges = Contour(segments.reshape(-1, 2), np.tile([Contour.MOVETO, Contour.LINETO], len(segments)))
+    # One path of all edges, in a collection, whose extent is found soonest.
+    axes.add_collection(PathCollection([edges], facecolors="none", edgecolors=TREE, linewidths=0.5, rasterized=True, zorder=2))
 
 
 def draw_path(axes: Axes, vehicle: Vehicle, path: np.ndarray, rooms: np.ndarray | None = None) -> None:
