@@ -28,7 +28,8 @@ from .problem import Pose, Problem, Waypoint, checked_waypoint
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
-from .search.hybrid_astar import HybridAStarRuns, goal_poses
+from .search.goal_poses import goal_poses
+from .search.hybrid_astar import HybridAStarRuns
 from .search.known_path import KnownPath
 from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
@@ -102,7 +103,7 @@ class _Call:
     def _free_goal(self) -> Pose:
         """Return the goal; if that is not free, the nearest free pose within its tolerances, where there is one."""
         checker = self.world.field.collision_checker(self._problem.vehicle)
-        poses = goal_poses(self._problem, checker).tolist()
+        poses = goal_poses(self._problem, self.world.field).tolist()
         x, y, theta = next(filter(checker.is_pose_free, poses), self._problem.goal)
         return x, y, theta
 
