@@ -106,8 +106,10 @@ def planner_title(planner: str) -> str:
 
 def path_title(planner: str, length: float, gap: float, waypoints: int = 0) -> str:
     """Return the title of a picture of a path over so many waypoints."""
-    over = f" over {waypoints} waypoint{'' if waypoints == 1 else 's'}" if waypoints else ""
-    return f"{planner_title(planner)}: {length:.2f} m{over}, at most {100 * gap:.1f} % above the shortest"
+    if waypoints:  # in no more letters, for which there is room
+        return (f"{planner_title(planner)}: {length:.2f} m over {waypoints} waypoint{'' if waypoints == 1 else 's'}, "
+                f"gap at most {100 * gap:.1f} %")
+    return f"{planner_title(planner)}: {length:.2f} m, at most {100 * gap:.1f} % above the shortest"
 
 
 def figures_title(samples: int, time_to_first: float, planning_time: float) -> str:
