@@ -53,6 +53,14 @@ def test_there_is_a_saddle_for_each_obstacle_that_is_no_wall(blocks, count):
     assert len(saddles(lengths.reshape(-1), lengths.shape[1], 5.0)) == 0  # no way is as short
 
 
+def test_no_detour_is_apart_from_a_path_that_a_huge_turning_radius_is_near_to():
+    """The squares near the path are no longer listed then: their number grows with the square of the radius."""
+    problem = Problem(room_with(BLOCK), Vehicle(turning_radius=1e4), START, GOAL)
+    field, from_start, to_goal = costs_of(problem)
+    detours = SaddleDetours(problem, Landscape(problem, field, from_start, to_goal), Objective(problem.vehicle, field), 100.0)
+    assert detours.next(path_over(6.0, 7.25)) is None
+
+
 def test_ways_over_a_node_fall_to_start_and_goal():
     problem = Problem(room_with(BLOCK), Vehicle(turning_radius=0.5), START, GOAL)
     field, from_start, to_goal = costs_of(problem)

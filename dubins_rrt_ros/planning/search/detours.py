@@ -21,6 +21,8 @@ NEAR_SHORTEST, SOON = (1.1, 0.0), (2.0, 0.5)
 #: Distance from the path within which no other corridor begins; distance from the way over a saddle within which it is planned,
 #: and length of the path that is planned anew before and behind it, in lengths of manoeuvres.
 APART, WIDTH, MARGIN = 1.0, 3.0, 4.0
+#: Maximum number of squares near nodes that are listed at once: their number grows with the square of the turning radius.
+MOST_AT_ONCE = 1_000_000
 #: Minimum share of the way over a saddle that leads where nothing was planned before.
 LEAST_NEW = 0.25
 #: Range of the random length of the path before and behind a closed place that is planned anew, and maximum distance of the walls
@@ -141,6 +143,8 @@ class SaddleDetours:
 
     def next(self, path: Path) -> Detour | None:
         """Return the detour with the greatest gain by the costs in relation to its length."""
+        if APART * self._landscape.scale >= math.hypot(*self._landscape.free.shape):
+            return None  # the whole map is near the path
         owners, costs = self._owners(path), np.append(0.0, np.cumsum(self._objective.curve_costs(path)))
         ends, lengths, new = self._descent.measure(self._seeds, owners, self._planned.reshape(-1))
         gains = costs[ends[:, 1]] - costs[ends[:, 0]] - lengths
@@ -163,10 +167,12 @@ class SaddleDetours:
         steps = np.arange(-math.floor(reach), math.floor(reach) + 1)
         up, right = np.nonzero(steps[:, None]**2 + steps**2 <= reach**2)
         places = np.rint(self._landscape.places(path.waypoints)).astype(int)
-        row = np.clip(places[:, 1, None] + steps[up], 0, rows - 1)
-        column = np.clip(places[:, 0, None] + steps[right], 0, columns - 1)
         owners = np.full((rows, columns), -1, np.int32)
-        owners[row, column] = np.arange(len(places))[:, None]
+        at_once = max(1, MOST_AT_ONCE // len(up))
+        for begin in range(0, len(places), at_once):
+            column, row = places[begin:begin + at_once].T
+            squares = (np.clip(row[:, None] + steps[up], 0, rows - 1), np.clip(column[:, None] + steps[right], 0, columns - 1))
+            owners[squares] = np.arange(begin, begin + len(row))[:, None]
         return owners.reshape(-1)
 
     def _near(self, way: np.ndarray, places: np.ndarray, first: int, begin: int, end: int, last: int) -> np.ndarray:
