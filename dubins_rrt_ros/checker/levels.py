@@ -135,7 +135,7 @@ class Squares(NamedTuple):
 
     def neighbours(self, some: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
         """Yield pairs of squares that share an edge or a node, with the lowest and the highest slab there."""
-        is_some = np.zeros((self.costs.shape[0] - 1) * self.columns + self.columns + 2, bool)
+        is_some = np.zeros(self.costs.size, bool)
         is_some[some] = True
         column = some % self.columns
         for down, right, nodes in ((0, 1, ((0, 1), (1, 1))), (1, 0, ((1, 0), (1, 1))), (1, 1, ((1, 1),)), (1, -1, ((1, 0),))):
@@ -152,6 +152,6 @@ def squared_slopes(corners: np.ndarray, triangles: tuple[tuple[tuple[int, int], 
         # Two of the three edges are sides of the square, at a right angle.
         first, second, third = corners[:, i, j], corners[:, k, m], corners[:, n, o]
         one = second - first
-        two = third - (second if (k - n, m - o) in ((1, 0), (0, 1), (-1, 0), (0, -1)) else first)
+        two = third - (second if abs(k - n) + abs(m - o) == 1 else first)
         steepest = np.maximum(steepest, one**2 + two**2)
     return steepest

@@ -80,7 +80,7 @@ def read_map(path: str | Path, allow_unknown: bool) -> World:
 
 def _grid(fields: dict[str, Any], folder: Path, allow_unknown: bool) -> World:
     rules: dict[str, Any] = {"mode": str(fields.get("mode", "trinary")).lower(),
-                             "negate": str(fields.get("negate", 0)).lower() in ("1", "true"),
+                             "negate": str(fields["negate"]).lower() in ("1", "true"),
                              "occupied_thresh": float(fields["occupied_thresh"]), "free_thresh": float(fields["free_thresh"])}
     cells = _occupancies(*_pixels(folder / fields["image"]), **rules)[::-1]  # a picture begins with the row at the top
     blocked = cells >= OCCUPIED_FROM if allow_unknown else (cells > FREE_UP_TO) | (cells == UNKNOWN)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support.cases import needs_compiled
 from support.certificates import Certified, certified, hall, pose_in, recorded, refusal, saved
-from support.spoils import SPOILS
+from support.spoils import SPOILS, Drive
 
-from dubins_rrt_ros.checker.check import Refused, check
+from dubins_rrt_ros.checker.check import Refused, check, goal_boxes
 from dubins_rrt_ros.checker.maps import UnreadableMap
 from dubins_rrt_ros.planning import Problem, Vehicle
 from dubins_rrt_ros.planning.certificate.certificate import CertificateError, write_certificate
@@ -78,6 +78,27 @@ def test_squares_and_a_vehicle_without_a_size_are_refused(tmp_path):
     for name in ("robot_radius", "goal_tolerance_xy"):
         assert "below 0" in verdict(tmp_path, request=request | {name: -1.0})
         assert "no number" in verdict(tmp_path, request=request | {name: float("nan")})
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.3])
+@pytest.mark.parametrize("turn", [0.0, 0.04, 0.7])
+def test_boxes_of_the_goal_cover_where_it_is_reached_and_little_more(tolerance, turn):
+    rng = np.random.default_rng(1)
+    boxes = goal_boxes((1.0, 2.0, 0.5), tolerance, turn, 7.0)
+    angle, share = rng.uniform(-np.pi, np.pi, 500), np.sqrt(rng.random(500)) * tolerance
+    poses = np.column_stack([1 + share * np.cos(angle), 2 + share * np.sin(angle), 0.5 + turn * rng.uniform(-1, 1, 500)])
+    off = np.abs(poses[:, None] - boxes[:, (0, 1, 6)])
+    assert (off <= boxes[:, (4, 5, 7)] + 1e-12).all(axis=2).any(axis=1).all()
+    assert (np.hypot(*np.maximum(0, np.abs(boxes[:, :2] - (1, 2)) - boxes[:, 4:6]).T) <= tolerance).all()
+    assert (boxes[:, 8] == 7).all() and boxes[:, 7].max() <= 0.05 and boxes[:, 4].max() <= tolerance / 8
+    assert sum(boxes[:, 4] * boxes[:, 5] * boxes[:, 7]) <= 1.5 * tolerance**2 * turn
+
+
+def test_a_start_on_a_level_is_refused(tmp_path):
+    """It would be in two cells."""
+    drive = Drive.of(TURNED)
+    levels = [drive.from_start.at(*drive.poses[0, :2])[1] + 1e-9, *TURNED.document["levels"]]
+    assert verdict(tmp_path, levels=levels) == "the start is not inside a slab"
 
 
 @pytest.mark.parametrize(
