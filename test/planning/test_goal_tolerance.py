@@ -126,3 +126,12 @@ def test_the_outermost_headings_are_within_the_tolerance_in_spite_of_rounding():
     for heading, tolerance in zip(rng.uniform(-300, 300, 200).tolist(), (10 ** rng.uniform(-3, 0.4, 200)).tolist(), strict=True):
         headings = goal_poses(Problem(ROOM, VEHICLE, START, (8.0, 6.0, heading), 0.0, tolerance), FIELD)[:, 2]
         assert max(abs(math.remainder(turned - heading, math.tau)) for turned in headings.tolist()) <= tolerance
+
+
+@pytest.mark.parametrize("turning_radius", [1e3, 1e4])
+def test_a_free_heading_is_that_of_an_arc_and_a_straight_where_others_need_a_loop(turning_radius):
+    """Of 16 headings none is near enough to that in which a goal a little aside is reached without turning all the way round."""
+    problem = Problem(ROOM, Vehicle(turning_radius, 0.2), START, (8.0, 2.001, 0.0), any_goal_heading=True)
+    for seed in range(3):
+        answer = plan(problem, Settings(samples=10, seed=seed))
+        assert answer.length == pytest.approx(6.0, abs=1e-3)

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..collision.clearance import ClearanceField
+from ..curves import dubins
 from ..curves.angles import wrap
 from ..problem import Problem
 
@@ -15,6 +16,9 @@ HEADINGS_AT_GOAL = 16
 DISTANCES_AT_GOAL, BEARINGS_AT_GOAL = 32, 96
 #: Number of times that the step between two distances is halved then.
 HALVINGS = 8
+#: Length by which curves to all these headings are longer than an arc and a straight, in turning radii, from which on the heading
+#: of these is added.
+DETOUR = math.pi
 #: Maximum share of the tolerances that is used, so that rounding does not lead out of them.
 WITHIN = 1 - 1e-9
 
@@ -41,8 +45,26 @@ class _FreePositions:
         self._headings = np.append(heading, wrap(heading + turns))
 
     def poses_at(self, position: np.ndarray) -> np.ndarray:
-        """Return (m, 3) poses at (2,) position, with the headings that the goal allows."""
-        return np.column_stack([np.tile(position, (len(self._headings), 1)), self._headings])
+        """Return (m, 3) poses at (2,) position, with headings that the goal allows."""
+        poses = np.column_stack([np.tile(position, (len(self._headings), 1)), self._headings])
+        straight = self._at_end_of_straight(position)
+        if not len(straight):
+            return poses
+        start, radius = np.array([self._problem.start]), self._problem.vehicle.turning_radius
+        lengths, shorter = (dubins.lengths(start, some, radius) for some in (poses, straight))
+        return np.vstack([poses, straight[[shorter.argmin()]]]) if shorter.min() < lengths.min() - DETOUR * radius else poses
+
+    def _at_end_of_straight(self, position: np.ndarray) -> np.ndarray:
+        """Return (m, 3) poses at (2,) position to which an arc and a straight lead from the start, as far as the goal allows."""
+        (x, y, theta), radius = self._problem.start, self._problem.vehicle.turning_radius
+        poses = []
+        for side in (1, -1):  # the straight is a tangent of the circle of the arc, whose middle is to the left or to the right
+            east, north = position - (x - side * radius * math.sin(theta), y + side * radius * math.cos(theta))
+            if (distance := math.hypot(east, north)) > radius:
+                heading = wrap(math.atan2(north, east) + side * math.asin(radius / distance))
+                if abs(wrap(heading - self._headings[0])) <= WITHIN * self._problem.yaw_tolerance:
+                    poses.append((*position.tolist(), heading))
+        return np.array(poses).reshape(-1, 3)
 
     def nearest(self) -> np.ndarray | None:
         """Return the (2,) free position nearest to the goal, of those tried; None where none is free."""
