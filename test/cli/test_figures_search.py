@@ -51,7 +51,7 @@ def test_the_informed_search_is_drawn_with_its_first_path_its_final_one_and_its_
     drawn = {colour: line for colour in (figures_search.FIRST, PATH) for line in lines_of(axes, colour)}
     for colour, answer in ((figures_search.FIRST, first), (PATH, final)):
         assert drawn[colour] == pytest.approx(answer.path.poses(figures_search.SPACING)[:, :2])
-    tree = np.array([path.vertices for path in axes.collections[0].get_paths()])
+    tree = np.concatenate([path.vertices for path in axes.collections[0].get_paths()]).reshape(-1, 2, 2)  # segments
     # But for what hybrid A* drove before its path was smoothed.
     assert len(tree) > 100 and (bounds.over(tree.mean(axis=1)) < first.length).mean() > 0.9
 
