@@ -4,7 +4,8 @@ import threading
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
-from ..planning.text import quoted_name
+from dubins_rrt_ros.planning.text import quoted_name
+
 from .rigid import IDENTITY, Rigid
 
 #: Time for which transforms are kept, before the newest of each frame [ns].

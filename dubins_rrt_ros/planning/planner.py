@@ -1,7 +1,6 @@
 """plan(): from a problem to an audited path, or to the reason why there is none."""
 
 import math
-import secrets
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -68,15 +67,8 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
     Raises:
         HookError: `is_free` of the problem or `sampler` of the settings raised an exception, or gave what it should not.
     """
-    return _Call(problem, with_seed(settings or Settings()), cancel or never, on_progress or _ignore, report_samples,
+    return _Call(problem, (settings or Settings()).with_seed(), cancel or never, on_progress or _ignore, report_samples,
                  seed_path).answer()
-
-
-def with_seed(settings: Settings) -> Settings:
-    """Return the settings with a fresh seed in place of -1."""
-    if settings.seed >= 0:
-        return settings
-    return replace(settings, seed=secrets.randbits(31))
 
 
 def _ignore(progress: Progress) -> None:

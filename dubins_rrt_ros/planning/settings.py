@@ -1,6 +1,7 @@
 """The settings of the planner: one frozen dataclass whose fields are options."""
 
-from dataclasses import dataclass, field
+import secrets
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .hooks import Sampler, check_function
@@ -86,6 +87,10 @@ class Settings:
     def weight_of_cells(self) -> float:
         """The extra cost of a metre over a cell of 100 %; 0 where cells between the thresholds are unknown."""
         return self.cost_weight if self.informed else 0.0
+
+    def with_seed(self) -> "Settings":
+        """Return the settings with a fresh seed in place of -1."""
+        return self if self.seed >= 0 else replace(self, seed=secrets.randbits(31))
 
     @classmethod
     def paper(cls, **others: Any) -> "Settings":

@@ -100,7 +100,7 @@ def test_the_cost_of_an_edge_is_the_integral(world_map, vehicle):
     field, rng = ClearanceField(world_map), np.random.default_rng(4)
     for preferred in (PREFERRED / 2, PREFERRED):
         objective, room = Objective(vehicle, field, preferred, WEIGHT), field.room(vehicle)
-        for curve in free_curves(world_map, field, vehicle, 25, rng):
+        for curve in free_curves(world_map, field, vehicle, 50, rng):
             found = objective.edge_cost().of_curve(curve.start, curve.radius, curve.index, curve.lengths)
             points = 2000
             poses, rooms = np.empty((points, 3)), np.empty(points)

@@ -109,6 +109,7 @@ class Search:
         self.growing = GrowingTree(problem, settings, field, nearest=runs.goals[0, :2] if runs else None)
         self.ready = False
         self._problem, self._settings, self._report_samples = problem, settings, report_samples
+        self._is_rrt = settings.planner == "rrt"
         self._deadline = deadline or Deadline(math.inf, never)
         self.work = Work(self._deadline.poll, settings.work_limits.search)
         self._informed: Informed | None = None
@@ -191,10 +192,6 @@ class Search:
         """True if RRT has its path, or the budget is used: informed, a search without a path goes on beyond it."""
         used = self.samples >= self._settings.samples and (self.best >= 0 or not self._settings.informed)
         return used or (self.best >= 0 and self._is_rrt)
-
-    @property
-    def _is_rrt(self) -> bool:
-        return self._settings.planner == "rrt"
 
     def run(self, seed_path: Path | None = None) -> Iterator[bool]:
         """Search, in steps of a few milliseconds each.
