@@ -82,6 +82,8 @@ def test_the_request_reads_back_and_gives_the_same_path(answer, hall):
 
 def test_a_search_that_was_cut_short_is_cut_at_the_same_sample(answer, hall, monkeypatch):
     monkeypatch.setattr("dubins_rrt_ros.planning.planner.REPORT_INTERVAL", 0)
+    for grace in ("CANCEL_GRACE", "CANCEL_AUDIT_GRACE"):  # on a machine under load they pass, and an earlier path is the answer
+        monkeypatch.setattr(f"dubins_rrt_ros.planning.deadline.{grace}", math.inf)
     samples = [0]
     cut = plan(answer.problem, answer.settings, cancel=lambda: samples[-1] > 0,
                on_progress=lambda progress: samples.append(progress.samples))
