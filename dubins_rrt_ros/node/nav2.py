@@ -1,4 +1,4 @@
-"""What Nav2 asks of a planner: the interfaces of its planner_server, where nav2_msgs is installed."""
+"""The interfaces of Nav2's planner_server, where nav2_msgs is installed."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Memory of requests, which the next one finds at hand."""
+"""Keep the memory that a request frees for the next one, rather than give it back to the system."""
 
 from functools import cache
 

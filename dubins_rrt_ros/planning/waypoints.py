@@ -119,7 +119,7 @@ class _Call:
         legs = self._legs(stops)
         headings = self._chosen_headings(legs)
         if headings is None:
-            return self._no_path(stops, legs)
+            return self._first_leg_without_path(stops, legs)
         paths = self._turned(stops, [leg.path(i, j) for leg, (i, j) in zip(legs, pairwise(headings), strict=True)])
         first = self._joined(stops, paths)
         if self._on_progress and first.path:
@@ -140,10 +140,10 @@ class _Call:
         """Return the plan from a start that is too near to an obstacle, or why there is none."""
         occupied = self._leg_plan(self._leg(*stops[:2]))
         if occupied.status != Status.START_OCCUPIED:
-            return self._no_way(stops[1], occupied)
+            return self._not_reached(stops[1], occupied)
         departure = find_departure(self._problem, self.world, occupied.message, self._clock.check)
         if departure.path is None:
-            return self._no_way(stops[1], replace(occupied, message=departure.message, location=departure.location))
+            return self._not_reached(stops[1], replace(occupied, message=departure.message, location=departure.location))
         passed = len(stops[0].waypoints)
         whole = WholePlans(self._problem, self._settings, departure, self.world, self._clock)
         rest = plan_through(whole.rest, self._waypoints[passed:], whole.settings_of_rest, cancel=self._cancel,
@@ -159,7 +159,7 @@ class _Call:
             room = [pose for pose in stop.poses if self.world.field.pose_is_free(pose, self._problem.vehicle)]
             if not room:
                 before, after = stops[max(n, 1) - 1:max(n, 1) + 1]
-                return self._no_way(after, self._leg_plan(self._leg(before, after)))
+                return self._not_reached(after, self._leg_plan(self._leg(before, after)))
             stops[n] = stop._replace(poses=room)
         return None
 
@@ -346,12 +346,12 @@ class _Call:
                   for here, there in pairwise((problem.start, *self._waypoints, goal))]
         return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
 
-    def _no_path(self, stops: list[Stop], legs: list[Leg]) -> Plan:
+    def _first_leg_without_path(self, stops: list[Stop], legs: list[Leg]) -> Plan:
         """Return the plan without a path, with what is known of the first leg that has none."""
         number = first_impassable([leg.costs for leg in legs]) or 0
-        return self._no_way(stops[number + 1], self._failures.get(id(legs[number])) or self._leg_plan(legs[number]))
+        return self._not_reached(stops[number + 1], self._failures.get(id(legs[number])) or self._leg_plan(legs[number]))
 
-    def _no_way(self, stop: Stop, found: Plan) -> Plan:
+    def _not_reached(self, stop: Stop, found: Plan) -> Plan:
         """Return the plan without a path that says which stop is not reached, and what was found instead of a path to it."""
         root = Tree.of_root(self._problem.start, self._problem.vehicle.turning_radius)
         if self._clock.poll() and self._clock.cancelled:

@@ -8,7 +8,7 @@ from .deadline import never
 
 
 class WorkDone(NamedTuple):
-    """Where the work that made a path ended, in units.
+    """The amounts of work after which a path was done, in units.
 
     Attributes:
         search: of the search.

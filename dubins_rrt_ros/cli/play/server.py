@@ -31,7 +31,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class PageSession(Protocol):
-    """What serves one page."""
+    """The server's side of one page."""
 
     def take(self, text: str) -> None:
         """Take a message of the page."""

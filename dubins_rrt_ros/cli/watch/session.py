@@ -17,7 +17,7 @@ ORDER = ("map", "parameters", "poses", "answer", "tree")
 
 
 class WatchSession:
-    """What one page sees and asks."""
+    """The session of one page: what it is shown, and what it asks for."""
 
     def __init__(self, listener: "Listener", send: Send):
         """Send what is known so far."""

@@ -1,4 +1,4 @@
-"""How much longer paths in buildings with several ways round are than the best that is known."""
+"""Paths in buildings with several ways round, compared with the best that is known."""
 
 import math
 from collections.abc import Iterator

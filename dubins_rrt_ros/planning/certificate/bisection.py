@@ -1,4 +1,4 @@
-"""Coarse boxes made fine where chains are cheap, by the planner's own lower bounds of curves between boxes."""
+"""Bisection of boxes: coarse ones are refined where chains of boxes are cheap, by the planner's bounds of curves between them."""
 
 from collections.abc import Callable
 

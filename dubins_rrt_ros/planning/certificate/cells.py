@@ -1,4 +1,4 @@
-"""Cells: what hangs together of the squares of a corridor within a slab, from one level of the costs to the next."""
+"""Cells: the connected components of a corridor's squares within a slab, between one level of the costs and the next."""
 
 import numpy as np
 from scipy.sparse import coo_array

@@ -1,4 +1,4 @@
-"""Potentials of boxes that are no higher than the checker shows."""
+"""Potentials of boxes, at most as high as the checker can verify."""
 
 from collections.abc import Callable
 

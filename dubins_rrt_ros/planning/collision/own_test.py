@@ -10,7 +10,7 @@ from ..hooks import IsFree, are_free
 
 
 class OwnTest:
-    """What `is_free` says of poses, motions and paths, at samples.
+    """The answers of `is_free` about poses, motions and paths, at samples.
 
     The kernels cannot pass on an exception. So the first one is kept, from then on nothing is free, and `cancel` ends the search.
 

@@ -13,7 +13,7 @@ STEP, MOST_POSES = 0.01, 2000
 
 
 class PathProgress:
-    """Where on a path the vehicle is. It never falls, also where the path crosses itself or the vehicle is beside it.
+    """The place of the vehicle on a path. It never goes back, also where the path crosses itself or the vehicle is beside it.
 
     Attributes:
         arc_length: from the path's start to the pose that the vehicle has reached [m].
@@ -38,7 +38,7 @@ class PathProgress:
 
     @property
     def ahead(self) -> Path:
-        """What is left of the path."""
+        """The rest of the path."""
         return self._path.after(self.arc_length)
 
     @property

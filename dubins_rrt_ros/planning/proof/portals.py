@@ -23,7 +23,7 @@ WAYS_BACK = 0.0025, 0.01, 0.04, 0.16
 
 
 class Edge(NamedTuple):
-    """What leads from one portal to another.
+    """An edge from one portal to another.
 
     Attributes:
         portal: the other one.

@@ -55,7 +55,7 @@ WIDE_GAP = 0.5
 
 
 class _Turns:
-    """When a source of detours is asked.
+    """The schedule of a source of detours.
 
     Attributes:
         source: the source.

@@ -1,4 +1,4 @@
-"""What a search minimises, for one vehicle on one map; `_kernels/edge_cost.py` states it for the kernels."""
+"""The objective of a search, for one vehicle on one map; `_kernels/edge_cost.py` states it for the kernels."""
 
 import math
 from dataclasses import dataclass

@@ -77,7 +77,7 @@ TIME_FOR_BOUND = 0.25
 
 
 class Informed(NamedTuple):
-    """What an informed search has besides.
+    """The means of an informed search.
 
     Attributes:
         runs: hybrid A*, for a first path and for others.
@@ -131,7 +131,7 @@ class Search:
 
     @property
     def objective(self) -> Objective:
-        """What is minimised."""
+        """The cost that is minimised."""
         return self.growing.objective
 
     @property
