@@ -238,10 +238,11 @@ def test_a_search_ends_as_soon_as_its_path_is_proved(maze):
 
 
 @needs_compiled
-def test_on_one_core_the_proof_follows_the_search(maze, monkeypatch):
+@pytest.mark.parametrize("samples", [3000, 10_000_000])
+def test_on_one_core_the_proof_shares_it_with_the_search(maze, monkeypatch, samples):
     monkeypatch.setattr("dubins_rrt_ros.planning.search.background.cores", lambda: 1)
-    result = plan(maze, Settings(seed=1, samples=3000, planning_time=60.0, stop_gap=0.03))
-    assert result.gap <= 0.03 + 1e-9
+    result = plan(maze, Settings(seed=1, samples=samples, planning_time=60.0, stop_gap=0.03))
+    assert result.gap <= 0.03 + 1e-9 and result.samples < 10_000_000
     assert result.path == plan(maze, Settings(seed=1, samples=result.samples, planning_time=60.0)).path
 
 

@@ -1,4 +1,4 @@
-"""The proof of a search that is under way, beside it on another core."""
+"""The proof of a search that is under way, in a thread beside it."""
 
 import math
 import time
@@ -20,7 +20,7 @@ NEGLIGIBLE_GAP = 5e-4
 class BackgroundProof:
     """Raises the lower bound of the lengths of a problem's paths towards the length of the best one.
 
-    On one core it would take the search's time: there it is started for a `stop_gap` of the length alone, and waits for `finish`.
+    On one core it takes the search's time: there it is started for a `stop_gap` of the length alone.
     """
 
     def __init__(self, problem: Problem, field: ClearanceField, settings: Settings, interrupted: Callable[[], bool],

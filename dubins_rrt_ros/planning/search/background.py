@@ -43,14 +43,16 @@ class BackgroundExecutor:
     """Runs jobs on the other cores; a caller that waits for a job not yet started runs it itself.
 
     So no job waits for another, and any number of requests can share one executor. On a single core every job is run by the
-    caller that asks for its result. A job must not change what its caller works on; kernels release the interpreter's lock.
+    caller that asks for its result, unless `shares_core`. A job must not change what its caller works on; kernels release the
+    interpreter's lock.
 
     Args:
         niceness: of the threads, where the system knows such of threads: with more than 0 they take what others leave.
+        shares_core: if True, jobs have a thread of their own on a single core too.
     """
 
-    def __init__(self, niceness: int = 0) -> None:
-        self._niceness = niceness
+    def __init__(self, niceness: int = 0, shares_core: bool = False) -> None:
+        self._niceness, self._shares_core = niceness, shares_core
         self._pool: ThreadPoolExecutor | None = None
 
     def start(self, function: Callable[Parameters, Result], *args: Parameters.args, **kwargs: Parameters.kwargs
@@ -59,7 +61,7 @@ class BackgroundExecutor:
         def compute() -> Result:
             return function(*args, **kwargs)
 
-        if cores() == 1:
+        if cores() == 1 and not self._shares_core:
             return BackgroundJob(compute, None)
         if self._pool is None:
             self._pool = ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="dubins_rrt_background",
@@ -78,7 +80,7 @@ class BackgroundExecutor:
 
 
 #: The executors of this process: for the searches, and for proofs, for which no search may have to wait.
-BACKGROUND, PROOFS = BackgroundExecutor(), BackgroundExecutor(niceness=10)
+BACKGROUND, PROOFS = BackgroundExecutor(), BackgroundExecutor(niceness=10, shares_core=True)
 if hasattr(os, "register_at_fork"):
     for executor in (BACKGROUND, PROOFS):
         os.register_at_fork(after_in_child=executor.forget_threads)
