@@ -138,9 +138,10 @@ def test_a_pose_without_a_frame_is_in_the_global_frame(planners, map_yaml):
 
 
 def test_who_comes_late_gets_the_last_path_status_and_tree(talk, module_planners):
-    told = talk.goal(GOAL, samples="300")
+    talk.goal(GOAL, samples="300")
     late = module_planners.client(listens_to_tree=True)
-    assert late.status_of(talk.asked)["revision"] == told["revision"]
+    latched = late.status_of(talk.asked, samples="300")
+    assert latched == talk.client.status_of(talk.asked, revision=latched["revision"])
     assert late.wait_for(lambda: late.paths, "the latched path")[0] == path_to(talk, GOAL)
     assert len(late.wait_for(lambda: late.trees, "the tree")[0].markers) == 5
 
