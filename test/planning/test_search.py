@@ -71,6 +71,15 @@ def test_a_seed_determines_every_byte(planner, problem, monkeypatch):
         assert (other.best, other.samples) == (once.best, once.samples)
 
 
+@pytest.mark.parametrize("cores", [1, 2])
+def test_a_bound_that_is_left_to_who_asks_is_not_computed_without_the_time_for_it(problems, monkeypatch, cores):
+    monkeypatch.setattr(background, "cores", lambda: cores)
+    search = search_on(problems["maze"], Settings(seed=1))
+    next(search.run())  # ends before the bounds are started
+    assert search.make_bound(0.0) is None and search.make_bound(0.1) is None
+    assert search.make_bound() is not None
+
+
 def test_another_seed_gives_another_tree(problem):
     assert contents(searched(problem, seed=2)) != contents(searched(problem))
 

@@ -34,6 +34,12 @@ class BackgroundJob(Generic[Result]):
         """Wait for the result, or compute it."""
         return self._result()
 
+    @property
+    def is_done(self) -> bool:
+        """True if the result is there."""
+        return self._result.cache_info().currsize > 0 or (self._future is not None and self._future.done()
+                                                          and not self._future.cancelled())
+
     def wait(self, seconds: float) -> bool:
         """Wait for so long; return True if the result is there, or is left to who asks for it."""
         return self._future is None or self._future.cancelled() or bool(wait_for([self._future], seconds).done)

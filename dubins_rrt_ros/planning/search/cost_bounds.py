@@ -11,6 +11,8 @@ from .background import BACKGROUND, BackgroundJob
 from .cost import Objective
 from .cost_to_go import CostToGo
 
+#: Time that must be left for a bound to be computed by who asks for it [s].
+TIME_FOR_BOUND = 0.25
 #: Minimum relative fall of the best cost for which nodes are pruned again.
 LEAST_FALL = 1e-4
 
@@ -55,6 +57,14 @@ class CostBounds:
     def wait(self, seconds: float) -> bool:
         """Wait for so long; return True if the bounds that were started are there, or are left to who asks for them."""
         return self._jobs is None or all(job is None or job.wait(seconds) for job in (*self._jobs, self._length_job))
+
+    def are_ready(self, seconds: float) -> bool:
+        """Wait for so long; return True if the bounds are there, or if that time suffices to compute what is left to who asks."""
+        return seconds == math.inf or (self.wait(seconds) and (seconds >= TIME_FOR_BOUND or self._are_done))
+
+    @property
+    def _are_done(self) -> bool:
+        return self._jobs is not None and all(job is None or job.is_done for job in (*self._jobs, self._length_job))
 
     def make_to_goal(self) -> CostToGo:
         """Make the cost to the goal a lower bound; nothing else may use it meanwhile."""

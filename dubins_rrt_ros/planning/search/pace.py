@@ -6,6 +6,10 @@ from contextlib import contextmanager
 
 from ..deadline import SLICE
 
+#: Share of the expected time of an item that it keeps at least after a portion that took less: poses near obstacles, which take
+#: many times as long as others, come in clusters.
+MEMORY = 0.95
+
 
 class Pace:
     """Sizes portions so that each takes about `duration`: a clock or a cancellation is looked at between them.
@@ -17,6 +21,7 @@ class Pace:
     def __init__(self, first: int, largest: int, duration: float = SLICE):
         self.size = first
         self._largest, self._duration = largest, duration
+        self._expected = 0.0
 
     @contextmanager
     def measured(self, items: int) -> Iterator[None]:
@@ -24,4 +29,5 @@ class Pace:
         started = time.perf_counter()
         yield
         took = max(time.perf_counter() - started, 1e-6)
-        self.size = max(1, min(int(self._duration * items / took), 4 * max(items, 1), self._largest))
+        self._expected = max(took / max(items, 1), MEMORY * self._expected)
+        self.size = max(1, min(int(self._duration / self._expected), 4 * max(items, 1), self._largest))

@@ -42,7 +42,7 @@ from ..settings import Settings
 from ..work import Work
 from .corridors import Corridors
 from .cost import Objective
-from .cost_bounds import CostBounds, LengthBounds
+from .cost_bounds import TIME_FOR_BOUND, CostBounds, LengthBounds
 from .cost_to_go import CostToGo
 from .growing_tree import GrowingTree
 from .hybrid_astar import HybridAStarRuns
@@ -72,8 +72,6 @@ ROUNDS = 3
 EARLY_LENGTH, EARLY_COST, EARLY_CURVES = 1.15, 1.3, 12
 #: Time for which results from the background are waited for before the time is looked at [s].
 WAIT = 0.002
-#: Time that must be left for a bound to be computed here where the background has not begun it yet [s].
-TIME_FOR_BOUND = 0.25
 
 
 class Informed(NamedTuple):
@@ -224,7 +222,7 @@ class Search:
         Returns:
             None unless the search is informed, and where what runs in the background does not end within that time.
         """
-        if not self._informed or not self.wait(seconds) or (seconds < math.inf and not self._informed.bounds.wait(seconds)):
+        if not self._informed or not self.wait(seconds) or not self._informed.bounds.are_ready(seconds):
             return None
         return self._informed.bounds.make_to_goal()
 
