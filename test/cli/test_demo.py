@@ -1,8 +1,10 @@
 """`dubins_rrt demo` for real: the node as its own process, real topics, a picture."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -55,9 +57,26 @@ def test_without_ros_the_remedy_is_told_in_one_line(monkeypatch, tmp_path, capsy
 
 def test_an_interrupted_demo_leaves_no_node_behind(tmp_path, monkeypatch, environment, capsys):
     """The node is replaced by a process that interrupts the demonstration and then waits for its own end."""
+    assert_interrupted(tmp_path, monkeypatch, capsys, "os.kill(os.getppid(), signal.SIGTERM)")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_demo_that_is_interrupted_while_the_node_starts_leaves_none_behind(tmp_path, monkeypatch, environment, capsys, number):
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            while not (tmp_path / "id").exists():
+                time.sleep(0.01)
+            os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(planner_process.subprocess, "Popen", Interrupted)
+    assert_interrupted(tmp_path, monkeypatch, capsys, "pass")
+
+
+def assert_interrupted(tmp_path, monkeypatch, capsys, doing):
     pytest.importorskip("rclpy")
-    program = (f"import os, signal; open({str(tmp_path / 'id')!r}, 'w').write(str(os.getpid())); "
-               "os.kill(os.getppid(), signal.SIGTERM); signal.pause()")
+    program = (f"import os, signal; open({str(tmp_path / 'new')!r}, 'w').write(str(os.getpid())); "
+               f"os.rename({str(tmp_path / 'new')!r}, {str(tmp_path / 'id')!r}); {doing}; signal.pause()")
     monkeypatch.setattr(planner_process, "planner_command", lambda: [sys.executable, "-c", program])
     assert main(["demo", "--plot", str(tmp_path / "demo.png")]) == 130
     assert "interrupted" in capsys.readouterr().err

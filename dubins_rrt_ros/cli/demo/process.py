@@ -75,13 +75,30 @@ def running_planner(parameters: Mapping[str, Any]) -> Iterator[PlannerProcess]:
     """Run the node with these parameters."""
     # SIGTERM ends this process as Ctrl-C does, so that no node is left behind.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    planner = None
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        planner = PlannerProcess(parameters, log)
         try:
+            with _interrupts_deferred():
+                planner = PlannerProcess(parameters, log)
             yield planner
         finally:
-            planner.stop()
+            if planner:
+                planner.stop()
             signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Let an interruption wait: within Popen it would leave a process that nobody knows."""
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if came:
+        raise KeyboardInterrupt
 
 
 def planner_command() -> list[str]:
