@@ -79,6 +79,7 @@ def test_it_answers_while_it_plans(planners, map_yaml, tmp_path, report):
     assert len(ticks) > 0.1 * WINDOW / INTERVAL  # also where the machine is busy: with the GIL held there are hardly any
 
 
+@pytest.mark.slow
 def test_the_first_path_comes_soon(planners, report):
     talk = Conversation(planners.start(map_file="maze", planner="rrt", samples=100_000, planning_time=15.0), planners.client())
     client, times = talk.client, []

@@ -93,7 +93,8 @@ def test_the_room_of_a_footprint_is_its_distance_from_the_obstacles(world_map, v
 
 
 @needs_compiled
-@pytest.mark.parametrize("vehicle", [DISC, CAR, BOOMERANG], ids=["disc", "car", "boomerang"])
+@pytest.mark.parametrize("vehicle", [DISC, CAR, pytest.param(BOOMERANG, marks=pytest.mark.slow)],
+                         ids=["disc", "car", "boomerang"])
 @pytest.mark.parametrize("world_map", [grid_with_noise(1), polygons(2)], ids=["grid", "polygons"])
 def test_the_cost_of_an_edge_is_the_integral(world_map, vehicle):
     """To 0.1 %, at any weight that paths are planned with by default and at several distances."""
