@@ -65,6 +65,16 @@ def test_cut_without_a_limit_or_a_curve_is_the_same():
         assert arrays_of(same.cut(longest)) == arrays_of(same)
 
 
+@pytest.mark.parametrize("longest", [0.3, 1.0, 100.0])
+def test_a_path_that_was_cut_is_not_changed_by_cutting_it_again(longest):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        path = random_path(rng)
+        pieces = path.cut(longest)
+        assert arrays_of(pieces.cut(longest)) == arrays_of(pieces)
+    assert longest < 100 or arrays_of(pieces) == arrays_of(path)
+
+
 def test_a_curve_of_a_whole_number_of_steps_has_as_many_pieces():
     for steps in (1, 3, 7, 30):
         for step in (0.1, 0.7, 1.0):

@@ -152,7 +152,10 @@ class Path:
                    np.concatenate([first.lengths, *(path.lengths[1:] for path in others)]), first.radius)
 
     def cut(self, longest: float) -> "Path":
-        """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited."""
+        """Return the same path with its curves cut into pieces no longer than `longest` [m]; 0 is unlimited.
+
+        Shorter curves stay as they are, to the last bit, so that a path that was cut is not changed by cutting it again.
+        """
         if longest == 0 or len(self.words) < 2:
             return self
         pieces = [self._pieces(i, longest) for i in range(1, len(self.words))]
@@ -165,6 +168,8 @@ class Path:
         """Return the ends of the pieces of the curve to waypoint `i`, and the lengths of their arcs."""
         lengths = self.lengths[i]
         count = max(1, math.ceil(lengths.sum() / longest * (1 - ROUNDING)))
+        if count == 1:
+            return self.waypoints[i:i + 1], lengths[None]
         bounds = lengths.sum() * np.arange(count + 1) / count
         ends = np.empty((count + 1, 3))
         _kernel.poses_along(self.waypoints[i - 1], self.radius, self.words[i], lengths, bounds, ends)
