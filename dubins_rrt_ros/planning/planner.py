@@ -33,8 +33,9 @@ from .world import World, problem_with_costs, world_of
 REPORT_INTERVAL = 0.05
 #: Poses this close are the same [m, rad]: what lies between them is rounding, of quaternions and the like.
 SAME = 1e-9
-#: Minimum time between two audits of improvements, in times that the last one took: the search has the rest.
-AUDIT_INTERVAL = 5
+#: Minimum time between two audits of improvements, in times that the last one took: the search has the rest; and where nobody
+#: is told of them and nothing waits for their proof, so that they only matter if the time does not suffice for the last audit.
+AUDIT_INTERVAL, UNHEARD_AUDIT_INTERVAL = 5, 50
 #: Minimum improvement of a cost that is not the length that is simplified and audited before the end, relative to the cost.
 WORTH_SIMPLIFYING = 1e-3
 #: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
@@ -223,8 +224,9 @@ class _Call:
         if self._best is None:
             return True
         least = LEAST_IMPROVEMENT if search.objective.is_length else WORTH_SIMPLIFYING * self._found_cost
-        return (search.cost < self._found_cost - least
-                and self._elapsed - self._last_audit >= AUDIT_INTERVAL * (self._audit_took + self._simplifying_took))
+        is_heard = self._on_progress is not _ignore or self._settings.stop_gap > 0
+        interval = (AUDIT_INTERVAL if is_heard else UNHEARD_AUDIT_INTERVAL) * (self._audit_took + self._simplifying_took)
+        return search.cost < self._found_cost - least and self._elapsed - self._last_audit >= interval
 
     def _is_right(self, path: Path | None, search: Search) -> bool:
         """Audit the best path of a search, and keep it where it is right; False too where the time does not suffice."""

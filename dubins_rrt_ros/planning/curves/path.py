@@ -94,7 +94,7 @@ class Path:
         rows = zip(self.waypoints[:-1], self.words[1:].tolist(), self.lengths[1:], strict=True)
         return tuple(DubinsCurve.of_row(start, self.radius, word, lengths) for start, word, lengths in rows)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """The length [m]."""
         first, second, third = self.lengths.T
@@ -113,16 +113,14 @@ class Path:
 
     def at(self, shares: np.ndarray) -> np.ndarray:
         """Return (n, 3) poses at (n,) shares of the length, each in [0, 1]; headings in [-pi, pi]."""
-        lengths = self.lengths[1:].sum(axis=1)
-        ends = np.cumsum(lengths)
-        arc_lengths = shares * self.lengths[1:].sum()
-        curves = np.minimum(np.searchsorted(ends, arc_lengths), len(ends) - 1)
+        arc_lengths = shares * self._total
+        curves = np.minimum(self._arc_lengths[1:].searchsorted(arc_lengths), len(self._arc_lengths) - 2)
         return poses_on(self.waypoints, self.words, self.lengths, self.radius, curves, curves + 1,
-                        arc_lengths - np.append(0.0, ends)[curves])
+                        arc_lengths - self._arc_lengths[curves])
 
     def after(self, arc_length: float) -> "Path":
         """Return what is left of the path behind an arc length [m]; its first waypoint is a pose of the path."""
-        ends = np.cumsum(self.lengths[1:].sum(axis=1))
+        ends = self._arc_lengths[1:]
         if len(ends) == 0 or arc_length >= ends[-1]:
             return Path.of_pose(self.end)
         if arc_length <= 0:
@@ -137,8 +135,19 @@ class Path:
         return Path(np.concatenate([start, self.waypoints[i:]]), self.words[i - 1:], lengths, self.radius)
 
     def arc_lengths(self) -> np.ndarray:
-        """Return the (n,) arc lengths at which the waypoints lie [m]."""
-        return np.append(0.0, np.cumsum(self.lengths[1:].sum(axis=1)))
+        """Return the (n,) arc lengths at which the waypoints lie [m]; read-only."""
+        return self._arc_lengths
+
+    @cached_property
+    def _arc_lengths(self) -> np.ndarray:
+        arc_lengths = np.append(0.0, np.cumsum(self.lengths[1:].sum(axis=1)))
+        arc_lengths.flags.writeable = False
+        return arc_lengths
+
+    @cached_property
+    def _total(self) -> np.float64:
+        """The length, added up in the order that `at` takes shares of [m]."""
+        return np.float64(self.lengths[1:].sum())
 
     def part(self, first: int, last: int) -> "Path":
         """Return the path from one waypoint to another."""

@@ -118,11 +118,11 @@ class _Merger:
                 break
             begin, middle, end = self._section(turns, arc, path.length)
             curves = self._curves(path, begin, middle, end)
-            if path.length - (end - begin) + sum(curve.length for curve in curves) > self._longest or _has_short_arc(curves):
+            if (path.length - (end - begin) + sum(curve.length for curve in curves) > self._longest or _has_short_arc(curves)
+                    or not all(map(self._is_free, curves))):
                 continue
             spliced = _spliced(path, begin, end, curves)
-            if (len(short_arcs(spliced)) < count and all(map(self._is_free, curves))
-                    and self._objective.path_cost(spliced) <= self._dearest):
+            if len(short_arcs(spliced)) < count and self._objective.path_cost(spliced) <= self._dearest:
                 return spliced
         return None
 
