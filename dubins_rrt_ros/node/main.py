@@ -1,19 +1,18 @@
 """The node's process: arguments, signals, exit status."""
 
 import argparse
-import contextlib
-import signal
 import sys
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.signals import uninstall_signal_handlers
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from dubins_rrt_ros.planning import MapError, OptionError
 from dubins_rrt_ros.planning.text import one_line
 
+from .interruption import Interruption
 from .parameter_files import as_yaml, unused_files
 from .parameter_table import as_table
 from .parameters import AS_TEXT, OPTIONS
@@ -21,7 +20,7 @@ from .planner_node import PlannerNode
 
 #: What ROS says of a list of lists in a parameter file.
 NESTED_LIST = "Sequences cannot be key"
-#: Maximum time until a signal is noticed [s].
+#: Maximum time until a signal is noticed whose exception was lost [s].
 SIGNAL_INTERVAL = 0.25
 
 
@@ -32,15 +31,15 @@ class ConfigurationError(Exception):
 def main(args: list[str] | None = None) -> int:
     """Run the node and return the exit status: 1 where its configuration cannot be used."""
     try:
-        return _run(sys.argv if args is None else args)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return 0  # SIGINT and SIGTERM end it regularly, also while something is published, which then fails
+        return _run(sys.argv if args is None else args, Interruption())
+    except KeyboardInterrupt:
+        return 0
     except ConfigurationError as error:
         print(f"planner: {error}", file=sys.stderr)
         return 1
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], interruption: Interruption) -> int:
     node = executor = None
     try:
         if printed := _parse(arguments).printed:
@@ -49,38 +48,29 @@ def _run(arguments: list[str]) -> int:
         node = _configured_node(arguments)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        _spin(executor, node)
+        _spin(executor, node, interruption)
     finally:
-        # A second signal must not interrupt the shutdown.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        # Waits for the thread in which rclpy acts on signals: it uses what executors destroy when they are shut down.
-        uninstall_signal_handlers()
+        interruption.ignore()
         if node is not None:
             node.close()
         if executor is not None:
             executor.shutdown()  # the garbage collector may take it after what it refers to, with a traceback
-        with contextlib.suppress(RuntimeError):  # the signal's own thread may be first
-            rclpy.try_shutdown()
+        rclpy.try_shutdown()
     return 0
 
 
-def _spin(executor: SingleThreadedExecutor, node: PlannerNode) -> None:
-    # Not spin(): a signal can come between its check of the context and its wait, which then never ends.
-    while rclpy.ok():
-        try:
-            executor.spin_once(timeout_sec=SIGNAL_INTERVAL)
-        except ExternalShutdownException:
-            raise
-        except Exception as error:  # of any kind: the node goes on
-            if not rclpy.ok():  # a signal came while something was published, which then fails
-                raise ExternalShutdownException from error
-            node.report_defect(error)
+def _spin(executor: SingleThreadedExecutor, node: PlannerNode, interruption: Interruption) -> None:
+    with interruption.waking(executor):
+        while not interruption.came:
+            try:
+                executor.spin_once(timeout_sec=SIGNAL_INTERVAL)
+            except Exception as error:  # of any kind: the node goes on
+                node.report_defect(error)
 
 
 def _configured_node(arguments: list[str]) -> PlannerNode:
     try:
-        rclpy.init(args=arguments)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # a ROS argument or a parameter file that cannot be read
         raise _refused_by_ros(error) from error
     try:
@@ -89,10 +79,6 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
         raise ConfigurationError(f"map_file: {error}") from error
     except (OptionError, NameValidationException, ParameterException) as error:
         raise ConfigurationError(one_line(str(error))) from error
-    except Exception as error:
-        if not rclpy.ok():  # a signal came meanwhile
-            raise ExternalShutdownException from error
-        raise
     for warning in unused_files(arguments, node.get_fully_qualified_name()):
         node.get_logger().warning(warning)
     return node

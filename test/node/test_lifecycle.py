@@ -36,7 +36,11 @@ class Manager:
 
     def change(self, transition: int) -> bool:
         """Ask for a transition; whether it succeeded."""
-        return self._client.response(self._change.call_async(ChangeState.Request(transition=Transition(id=transition)))).success
+        return self._client.response(self.request(transition)).success
+
+    def request(self, transition: int):
+        """Ask for a transition without waiting for it."""
+        return self._change.call_async(ChangeState.Request(transition=Transition(id=transition)))
 
     @property
     def state(self) -> int:
@@ -110,3 +114,14 @@ def test_a_signal_ends_it_in_every_state(installed_planners, map_file):
         manager = Manager(installed_planners, map_file=map_file)
         assert all(map(manager.change, transitions))
         assert manager.process.end(signal.SIGINT) == 0, manager.process.output
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM], ids=lambda by: by.name)
+def test_a_signal_ends_it_while_it_is_configured_and_cleaned_up_again_and_again(planners, by):
+    manager = Manager(planners)
+    assert manager.change(CONFIGURE)
+    for _ in range(5):
+        manager.request(CLEANUP)
+        manager.request(CONFIGURE)
+    assert manager.process.end(by) == 0, manager.process.output
+    assert "Traceback" not in manager.process.output

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import rclpy
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 
+from dubins_rrt_ros.node.interruption import Interruption
 from dubins_rrt_ros.node.main import _spin
 from dubins_rrt_ros.node.planner_node import PlannerNode
 
@@ -20,14 +22,14 @@ INTERVAL = 0.01
 
 
 def main(file: str) -> None:
-    rclpy.init(args=sys.argv)
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     node, executor = PlannerNode(), SingleThreadedExecutor()
     ticks = []
     node.create_timer(INTERVAL, lambda: ticks.append(time.monotonic()), clock=Clock(clock_type=ClockType.STEADY_TIME))
     executor.add_node(node)
     try:
-        _spin(executor, node)
-    except (KeyboardInterrupt, ExternalShutdownException):
+        _spin(executor, node, Interruption())
+    except KeyboardInterrupt:
         pass
     finally:
         Path(file).write_text(json.dumps(ticks))
