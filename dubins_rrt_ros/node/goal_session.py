@@ -182,6 +182,7 @@ class GoalSession:
     def _begin(self, goal: Goal, plan_id: int) -> None:
         """Make this the goal that counts."""
         self._goal, self._passed, self._is_reached, self._map_changed = goal, 0, False, False
+        self._progress, self._to_pass = None, []  # along the path on display, which leads to another goal
         self._forget_failure()
         self._drop_waiting()
         self._plan(_Purpose.GOAL, plan_id)

@@ -298,6 +298,18 @@ def test_a_goal_is_planned_at_least_once_and_reaching_it_ends_the_replanning_onl
     client.wait_for(lambda: client.paths[shown:], "its path")
 
 
+def test_a_vehicle_at_the_goal_before_has_not_reached_the_one_that_is_being_planned(drive):
+    drive = drive(DETOUR, start=GOAL, replan_on_map_change=True, publish="final")
+    client = drive.client
+    drive.go(GOAL, error_name="NONE")
+    client.set_parameters(samples=10_000_000, planning_time=1.0)
+    plan_id = client.begin_goal(START)
+    drive.start(GOAL)
+    client.status_of(plan_id, error_name="NONE")
+    drive.show(CLOSED)
+    assert "not free" in client.status_of(plan_id, error_name="NO_VALID_PATH")["message"]
+
+
 def test_publish_final_publishes_one_path_for_each_request_and_improvements_each_better_one(drive):
     drive = drive(DETOUR, samples=3000, publish="final")
     client = drive.client
