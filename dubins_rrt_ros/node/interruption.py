@@ -1,7 +1,7 @@
 """SIGINT and SIGTERM, which end the process regularly.
 
-rclpy's own handlers are not used: in a thread of theirs they wake all executors there are, and use after it was freed what an
-executor that is made or destroyed meanwhile leaves behind. A managed node does both whenever it is configured and cleaned up.
+rclpy's own handlers are not used: in a thread of theirs they wake all executors there are, and use what an executor that is made
+or destroyed meanwhile has freed. A managed node makes and destroys one whenever it is configured and cleaned up.
 """
 
 import contextlib
@@ -13,36 +13,32 @@ from types import FrameType
 
 from rclpy.executors import Executor
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
 
 class Interruption:
-    """Makes the first signal a KeyboardInterrupt in the main thread; later ones do nothing.
+    """Takes the signals: the first one raises KeyboardInterrupt until they are deferred; later ones do nothing more.
 
     Attributes:
-        came: True once there was one: what Python runs as an object is destroyed may have lost the exception.
+        came: True once there was a signal.
     """
 
     def __init__(self):
-        self.came = False
-        for number in SIGNALS:
+        self.came = self._is_deferred = False
+        for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._interrupt)
 
+    def defer(self) -> None:
+        """Raise nothing from now on, so that neither callbacks nor the end are broken off."""
+        self._is_deferred = True
+
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        if not self.came:
-            self.came = True
+        is_first, self.came = not self.came, True
+        if is_first and not self._is_deferred:
             raise KeyboardInterrupt
 
-    @staticmethod
-    def ignore() -> None:
-        """Let no signal break off the end of the process."""
-        for number in SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
-
-    @staticmethod
     @contextlib.contextmanager
-    def waking(executor: Executor) -> Iterator[None]:
-        """Have each signal end the wait of this executor, during which the interpreter raises nothing."""
+    def waking(self, executor: Executor) -> Iterator[None]:
+        """Defer signals, and have each of them give this executor something to do, so that it does not wait on."""
+        self.defer()
         reader, writer = os.pipe()
         os.set_blocking(writer, False)
         waker = threading.Thread(target=_wake, args=(executor, reader), name="signals", daemon=True)
@@ -59,4 +55,4 @@ class Interruption:
 
 def _wake(executor: Executor, reader: int) -> None:
     while os.read(reader, 1):
-        executor.wake()
+        executor.create_task(lambda: None)

@@ -20,8 +20,6 @@ from .planner_node import PlannerNode
 
 #: What ROS says of a list of lists in a parameter file.
 NESTED_LIST = "Sequences cannot be key"
-#: Maximum time until a signal is noticed whose exception was lost [s].
-SIGNAL_INTERVAL = 0.25
 
 
 class ConfigurationError(Exception):
@@ -50,7 +48,7 @@ def _run(arguments: list[str], interruption: Interruption) -> int:
         executor.add_node(node)
         _spin(executor, node, interruption)
     finally:
-        interruption.ignore()
+        interruption.defer()
         if node is not None:
             node.close()
         if executor is not None:
@@ -63,7 +61,7 @@ def _spin(executor: SingleThreadedExecutor, node: PlannerNode, interruption: Int
     with interruption.waking(executor):
         while not interruption.came:
             try:
-                executor.spin_once(timeout_sec=SIGNAL_INTERVAL)
+                executor.spin_once()
             except Exception as error:  # of any kind: the node goes on
                 node.report_defect(error)
 

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 from nav_msgs.msg import OccupancyGrid
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -227,12 +226,10 @@ class Maps:
             self.take(grid, grid, by_topic=True)
 
     def _load_first(self, name: str) -> Loaded:
-        """Load the map that the node begins with; a signal ends the wait for it."""
+        """Load the map that the node begins with, in the worker: a signal ends the wait for it."""
         loaded: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._worker.submit(lambda cancelled: self._load(name, ""), loaded.put)
         while (outcome := _next_of(loaded, LOADING_INTERVAL)) is None:
-            if not self._node.context.ok():
-                raise ExternalShutdownException
             self._node.get_logger().info(f"Still loading the map {one_line(name)}", throttle_duration_sec=STILL_LOADING_INTERVAL)
         if isinstance(outcome, Exception):
             raise outcome
