@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .curves import dubins
 from .curves.angles import heading_error, position_error, wrap
 from .curves.path import Path
 from .planner import SAME
@@ -68,6 +69,15 @@ def _poses(place: Waypoint) -> list[Pose]:
     x, y, theta = place
     headings = wrap(np.arange(HEADINGS) * (math.tau / HEADINGS)).tolist() if theta is None else [theta]
     return [(x, y, heading) for heading in headings]
+
+
+def least_length(problem: Problem, waypoints: Sequence[Waypoint]) -> float:
+    """Return a length that no path over the waypoints falls below [m]."""
+    goal = (*problem.goal[:2], problem.goal[2] if problem.yaw_tolerance == 0 else None)
+    bounds = [math.dist(here[:2], there[:2]) if here[2] is None or there[2] is None
+              else dubins.shortest((*here[:2], here[2]), (*there[:2], there[2]), problem.vehicle.turning_radius).length
+              for here, there in pairwise((problem.start, *waypoints, goal))]
+    return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
 
 
 def legs_along(path: Path, stops: Sequence[Stop]) -> list[Path] | None:

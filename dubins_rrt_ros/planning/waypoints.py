@@ -35,7 +35,7 @@ from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
-from .stops import HEADINGS, Stop, legs_along, passing_indices, stops_of
+from .stops import HEADINGS, Stop, least_length, legs_along, passing_indices, stops_of
 from .work import Work
 from .world import problem_with_costs, world_of
 
@@ -242,7 +242,8 @@ class _Call:
 
     def _leg_plan(self, leg: Leg) -> Plan:
         """Plan a leg from its first start to its end."""
-        settings = replace(self._settings, samples=1, planner="rrt", planning_time=self._time(0.5))
+        samples = 1 if self._settings.informed else max(1, self._settings.samples // (len(self._waypoints) + 1))
+        settings = replace(self._settings, samples=samples, planner="rrt", planning_time=self._time(0.5))
         problem = Problem(self.world, start=leg.starts[0], goal=leg.ends[0], any_goal_heading=len(leg.ends) > 1)
         return plan(problem, settings, cancel=self._cancel)
 
@@ -323,7 +324,7 @@ class _Call:
         count = len(self._waypoints)
         message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
                    f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s{end_clause(self._problem, path)}.")
-        bound = min(self._lower_bound(), path.length)
+        bound = min(least_length(self._problem, self._waypoints), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
                             roomy_share=self._objective.roomy_share(path), found_by=self._found_by,
@@ -336,15 +337,6 @@ class _Call:
         audit = audit_path(path, self._problem, self.world.obstacles, self._clock.check)
         self._clock.reserve = AUDIT_RESERVE * (self._clock.elapsed - began)
         return Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
-
-    def _lower_bound(self) -> float:
-        """Return a length that no path over the waypoints falls below [m]."""
-        problem = self._problem
-        goal = (*problem.goal[:2], problem.goal[2] if problem.yaw_tolerance == 0 else None)
-        bounds = [math.dist(here[:2], there[:2]) if here[2] is None or there[2] is None
-                  else dubins.shortest((*here[:2], here[2]), (*there[:2], there[2]), problem.vehicle.turning_radius).length
-                  for here, there in pairwise((problem.start, *self._waypoints, goal))]
-        return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
 
     def _first_leg_without_path(self, stops: list[Stop], legs: list[Leg]) -> Plan:
         """Return the plan without a path, with what is known of the first leg that has none."""
@@ -364,8 +356,8 @@ class _Call:
             # What is found out about one heading at a waypoint need not hold for all; and a leg has but a part of the time.
             status = Status.TIMEOUT
             reason = found.message.partition("; ")[2] if self._has_all_headings(found.problem) else ""
-            why = (f"On the way to {place}: No path within planning_time {self._settings.planning_time:g} s, and waypoints take "
-                   f"more of it than a goal alone; {reason or 'allow more time.'}")
+            what, more = self._limit(found)
+            why = f"On the way to {place}: {what}; {reason or f'allow more {more}.'}"
         elif found.path:
             status = Status.TIMEOUT
             why = f"No path reaches {place} with a heading that leads on; allow more planning_time, waypoints take more of it."
@@ -374,6 +366,15 @@ class _Call:
         elif found.message.startswith("Goal "):
             why = found.message.replace("Goal", name[0].upper() + name[1:], 1)
         return self._plan(status, why, root, location=found.location)
+
+    def _limit(self, found: Plan) -> tuple[str, str]:
+        """Return what ended the search for a path of a leg, and what there has to be more of."""
+        if found.status != Status.TIMEOUT:
+            return "No path found with the headings that were tried at its ends", "time"
+        if not self._settings.informed and found.samples >= found.settings.samples:
+            return f"No path found within {found.samples} samples, the leg's share", "samples"
+        limit = f"planning_time {self._settings.planning_time:g} s"
+        return f"No path within {limit}, and waypoints take more of it than a goal alone", "time"
 
     def _has_all_headings(self, leg: Problem) -> bool:
         """Return True if a leg was planned with all headings that its ends may have."""
