@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_rrt_ros.planning import Pose, Problem, Settings, Vehicle, World, load_map, plan, plan_through, prepare
+from dubins_rrt_ros.planning import Plan, Pose, Problem, Settings, Vehicle, World, load_map, plan, plan_through, prepare
 from dubins_rrt_ros.planning.search.legs import cheapest_chain
 
 from .families.buildings import building
@@ -37,13 +37,14 @@ def main() -> int:
     """Compare, and return the exit status: 1 where a path is not as short as the reference."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--number", type=int, default=10, help="number of problems on each map")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them, to go on where another run ended")
     parser.add_argument("--maps", nargs="+", choices=MAPS, default=list(MAPS))
     parser.add_argument("--headings", type=int, default=HEADINGS)
     arguments = parser.parse_args()
     lines: list[dict[str, Any]] = []
     for name in arguments.maps:
         world = prepare(MAPS[name](), VEHICLE)
-        for number in range(arguments.number):
+        for number in range(arguments.first, arguments.first + arguments.number):
             lines.append({"map": name, "number": number, **compare(world, number, arguments.headings)})
             print(json.dumps(lines[-1]), flush=True)
     differing = [line for line in lines if line["leg_by_leg"] - line["reference"] > SAME]
@@ -55,9 +56,9 @@ def main() -> int:
 
 
 def compare(world: World, seed: int, headings: int = HEADINGS) -> dict[str, float]:
-    """Return the length of a path over two random waypoints, that of the reference, and that of leg by leg [m]."""
+    """Return the length of a path over two random waypoints, that of the reference, that of leg by leg [m], and its time [s]."""
     start, *places, goal = _random_poses(world, np.random.default_rng(seed))
-    length = plan_through(Problem(world, start=start, goal=goal), [place[:2] for place in places], WHOLE).length
+    answer = plan_through(Problem(world, start=start, goal=goal), [place[:2] for place in places], WHOLE)
     turns = (np.arange(headings) * math.tau / headings - math.pi).tolist()
     stops = [[start], *([(x, y, turn) for turn in turns] for x, y, _ in places), [goal]]
     legs = [_lengths(world, here, there) for here, there in pairwise(stops)]
@@ -66,9 +67,10 @@ def compare(world: World, seed: int, headings: int = HEADINGS) -> dict[str, floa
     for leg in legs:
         there = int(np.argmin(leg[at]))
         by_legs, at = by_legs + leg[at, there], there
-    return {"length": length if length is not None else math.inf,
+    return {"length": _length_of(answer),
             "reference": sum(float(leg[i, j]) for leg, (i, j) in zip(legs, pairwise(chain), strict=True)),
-            "leg_by_leg": float(by_legs)}
+            "leg_by_leg": float(by_legs),
+            "time_to_first": answer.time_to_first or math.inf, "planning_time": answer.planning_time}
 
 
 def _random_poses(world: World, rng: np.random.Generator) -> list[Pose]:
@@ -93,8 +95,11 @@ def _free(world: World, poses: list[Pose]) -> Iterator[Pose]:
 
 
 def _length(world: World, start: Pose, goal: Pose) -> float:
-    length = plan(Problem(world, start=start, goal=goal), LEG).length
-    return math.inf if length is None else length
+    return _length_of(plan(Problem(world, start=start, goal=goal), LEG))
+
+
+def _length_of(answer: Plan) -> float:
+    return math.inf if answer.length is None else answer.length
 
 
 if __name__ == "__main__":
