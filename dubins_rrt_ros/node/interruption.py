@@ -13,9 +13,12 @@ from types import FrameType
 
 from rclpy.executors import Executor
 
+#: The signals by which users and launch files end a node.
+SIGNALS = signal.SIGINT, signal.SIGTERM
+
 
 class Interruption:
-    """Takes the signals: the first one raises KeyboardInterrupt until they are deferred; later ones do nothing more.
+    """Takes the signals: the first one raises KeyboardInterrupt until an executor is woken instead; later ones do nothing.
 
     Attributes:
         came: True once there was a signal.
@@ -23,12 +26,14 @@ class Interruption:
 
     def __init__(self):
         self.came = self._is_deferred = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             signal.signal(number, self._interrupt)
 
-    def defer(self) -> None:
-        """Raise nothing from now on, so that neither callbacks nor the end are broken off."""
-        self._is_deferred = True
+    @staticmethod
+    def ignore() -> None:
+        """Let no signal break off the end, nor that of the interpreter, which takes away handlers of Python."""
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         is_first, self.came = not self.came, True
@@ -37,8 +42,8 @@ class Interruption:
 
     @contextlib.contextmanager
     def waking(self, executor: Executor) -> Iterator[None]:
-        """Defer signals, and have each of them give this executor something to do, so that it does not wait on."""
-        self.defer()
+        """Have signals break off nothing from now on; each gives this executor something to do, so that it does not wait on."""
+        self._is_deferred = True
         reader, writer = os.pipe()
         os.set_blocking(writer, False)
         waker = threading.Thread(target=_wake, args=(executor, reader), name="signals", daemon=True)

@@ -48,7 +48,7 @@ def _run(arguments: list[str], interruption: Interruption) -> int:
         executor.add_node(node)
         _spin(executor, node, interruption)
     finally:
-        interruption.defer()
+        interruption.ignore()
         if node is not None:
             node.close()
         if executor is not None:
