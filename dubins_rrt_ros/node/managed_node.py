@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
@@ -41,10 +42,20 @@ class ManagedNode(LifecycleNodeMixin, Node, ABC):
         """Set up and be active, or wait for a lifecycle manager."""
         if managed:
             LifecycleNodeMixin.__init__(self)
+            self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
             self.get_logger().info("Unconfigured: waiting for a lifecycle manager")
         else:
             self.set_up()
             self.is_active = True
+
+    def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer a request for a transition; rclpy's own callback, `change`, has no answer where the state does not have it."""
+        wanted = request.transition
+        if wanted.label or wanted.id in {number for number, *_ in self._state_machine.available_transitions}:
+            return change(request, response)
+        self.get_logger().warning(f"The state '{self._state_machine.current_state[1]}' has no transition {wanted.id}")
+        response.success = False
+        return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Set up."""

@@ -116,6 +116,16 @@ def test_a_signal_ends_it_in_every_state(installed_planners, map_file):
         assert manager.process.end(signal.SIGINT) == 0, manager.process.output
 
 
+def test_a_transition_that_the_state_does_not_have_is_refused(planners):
+    manager = Manager(planners)
+    for state, transitions in ((UNCONFIGURED, (ACTIVATE, DEACTIVATE, CLEANUP, 77)), (INACTIVE, (CONFIGURE, DEACTIVATE)),
+                               (ACTIVE, (CONFIGURE, ACTIVATE, CLEANUP))):
+        assert not any(map(manager.change, transitions))
+        assert manager.state == state
+        assert manager.change(CONFIGURE if state == UNCONFIGURED else ACTIVATE) == (state != ACTIVE)
+    assert "defect" not in manager.process.output
+
+
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM], ids=lambda by: by.name)
 def test_a_signal_ends_it_while_it_is_configured_and_cleaned_up_again_and_again(planners, by):
     manager = Manager(planners)
