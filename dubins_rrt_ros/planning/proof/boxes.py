@@ -107,10 +107,11 @@ class Portal:
 
     def _add(self, boxes: np.ndarray, gradients: np.ndarray) -> None:
         """Add boxes, but for those that no path of the vehicle shorter than the limit can cross."""
-        middles, reach = np.ascontiguousarray(boxes[:, :2]), boxes[:, 4]
-        left = self._sets.least_left(middles, reach)
-        needed = ((np.abs(wrap(gradients - boxes[:, 6])) <= boxes[:, 7] + RIGHT_ANGLE) & (self.level + left < self._limit)
-                  & self._sets.may_be_free(middles, reach))
+        left = self._sets.least_left(np.ascontiguousarray(boxes[:, :2]), boxes[:, 4])
+        needed = (np.abs(wrap(gradients - boxes[:, 6])) <= boxes[:, 7] + RIGHT_ANGLE) & (self.level + left < self._limit)
+        boxes, gradients, left = self._sets.box_room.trim(boxes[needed]), gradients[needed], left[needed]
+        needed = boxes[:, 4] >= 0
+        needed[needed] = self._sets.box_room.may_be_crossed(boxes[needed], self.level, left[needed])
         count = int(needed.sum())
         self.boxes = np.concatenate([self.boxes, boxes[needed]])
         self._gradients = np.concatenate([self._gradients, gradients[needed]])

@@ -29,7 +29,7 @@ from .portals import Edge, PortalGraph
 
 #: Shares of the length of the path by which the lengths that are proved one after the other are below it.
 GAPS = (0.5, 0.2, 0.15, 0.12, 0.1, 0.08, 0.065, 0.05, 0.04, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
-#: Minimum distance of the first levels, and of those that are added, from others, in turning radii.
+#: Minimum distance of the first levels from others, and of those that are added, and of all from the goal, in turning radii.
 SPACING, LEAST_SPACING = 0.6, 0.35
 #: Clearance up to which the path is taken to touch an obstacle, as a share of the required one, where a first level is put.
 CONTACT = 1.3
@@ -131,7 +131,8 @@ class LengthProof:
         tight = np.flatnonzero((room[1:-1] <= room[:-2]) & (room[1:-1] < room[2:]) & (room[1:-1] < CONTACT * required)) + 1
         levels: list[float] = []
         for level in costs[tight[np.argsort(room[tight], kind="stable")]].tolist():
-            if all(abs(level - other) > SPACING * self._radius for other in (0.0, self._sets.end, *levels)):
+            is_apart = all(abs(level - other) > SPACING * self._radius for other in (0.0, *levels))
+            if is_apart and self._sets.end - level > LEAST_SPACING * self._radius:
                 levels.append(level)
         for level in takewhile(lambda _: not self._interrupted(), sorted(levels)):
             if 0 < level < self._sets.end:

@@ -18,14 +18,13 @@ from ..curves.angles import wrap
 from ..problem import Problem
 from ..search.cost_bounds import LengthBounds
 from ..search.cost_to_go import CostToGo
+from .box_room import BoxRoom
 
 #: The corners (column, row) of the triangles of a square that is split along each of its diagonals.
 UPWARDS = (((0, 0), (1, 0), (1, 1)), ((0, 0), (0, 1), (1, 1)))
 DOWNWARDS = (((0, 0), (1, 0), (0, 1)), ((1, 1), (1, 0), (0, 1)))
 #: Squares that touch at a corner are connected.
 EIGHT_NEIGHBORS = np.ones((3, 3), bool)
-#: Allowance for rounding of clearances [m].
-ROUNDING = 1e-9
 
 
 class Pieces(NamedTuple):
@@ -57,12 +56,12 @@ class LevelSets:
     def __init__(self, problem: Problem, field: ClearanceField, bounds: LengthBounds | None = None):
         """Take the lengths from the start and to the goal, which must be lower bounds, or compute them."""
         self._field = field
-        self._required_clearance = problem.vehicle.required_clearance
+        self.box_room = BoxRoom(field, problem.vehicle.required_clearance, problem.vehicle.turning_radius)
         self._from_start, self._to_goal = bounds or LengthBounds(CostToGo.from_start(problem, field).make_bound(),
                                                                  CostToGo.to_goal(problem, field).make_bound())
         self._costs = self._from_start.kernel.nodes()
         self._least, self._most = _least_of_corners(self._costs), -_least_of_corners(-self._costs)
-        self._is_free = field.free_squares(self._required_clearance).is_free[:-1, :-1] != 0
+        self._is_free = field.free_squares(problem.vehicle.required_clearance).is_free[:-1, :-1] != 0
         self._least_left = _least_of_corners(self._to_goal.kernel.nodes())
         self._total = self._least + self._least_left
         self.end = self._cost_at_goal(problem)
@@ -163,10 +162,6 @@ class LevelSets:
     def least_left(self, points: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Return (n,) lower bounds of the way to the goal [m] from within `reach` [m] of (n, 2) points, along level sets."""
         return np.asarray(np.maximum(self._to_goal.at(points) - reach, 0))
-
-    def may_be_free(self, points: np.ndarray, reach: np.ndarray) -> np.ndarray:
-        """Return (n,) bool: False where no point within `reach` [m] of (n, 2) points has the required clearance."""
-        return np.asarray(self._field.at(points) + reach >= self._required_clearance - ROUNDING)
 
 
 def _least_of_corners(nodes: np.ndarray) -> np.ndarray:
