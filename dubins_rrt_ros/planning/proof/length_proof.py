@@ -161,21 +161,28 @@ class LengthProof:
     def _shortest_string(self) -> tuple[list[tuple[Portal, np.ndarray]], float]:
         """Return a point for each portal on the shortest string over the centres of boxes, and the string's length."""
         start, goal = self._graph.portals[0], self._graph.portals[-1]
-        costs, links = {id(start): np.zeros(1)}, {}
+        costs = {id(start): np.zeros(1)}
+        links: dict[int, tuple[list[Edge], np.ndarray, np.ndarray]] = {}  # edges; for each box one of them, and a box there
         for portal in self._graph.portals[1:]:
             points = portal.boxes[:, :2]
-            costs[id(portal)], links[id(portal)] = np.full(len(points), math.inf), [(start, 0)] * len(points)
-            for source, least in self._graph.edges(portal):
-                if len(source) and len(points):
+            edges = [edge for edge in self._graph.edges(portal) if len(edge.portal) and len(points)]
+            known, number, before = np.full(len(points), math.inf), *np.zeros((2, len(points)), int)
+            for index, (source, least) in enumerate(edges):
+                if costs[id(source)].min() + least < known.max():
                     lengths = np.hypot(*(source.boxes[:, None, :2] - points[None]).transpose(2, 0, 1))
                     lengths = costs[id(source)][:, None] + np.maximum(lengths, least)
-                    for index in np.flatnonzero(lengths.min(axis=0) < costs[id(portal)]).tolist():
-                        links[id(portal)][index] = source, int(lengths[:, index].argmin())
-                    costs[id(portal)] = np.minimum(costs[id(portal)], lengths.min(axis=0))
-        string, portal, index = [(goal, goal.boxes[0, :2])], goal, 0
+                    box = lengths.argmin(axis=0)
+                    lengths = lengths[box, np.arange(len(points))]
+                    better = lengths < known
+                    known[better], number[better], before[better] = lengths[better], index, box[better]
+            costs[id(portal)], links[id(portal)] = known, (edges, number, before)
+        string, portal, box_index = [(goal, goal.boxes[0, :2])], goal, 0
         while portal is not start:
-            portal, index = links[id(portal)][index]
-            string.append((portal, portal.boxes[index, :2]))
+            edges, number, before = links[id(portal)]
+            if not edges:
+                return [(start, start.boxes[0, :2])], math.inf
+            portal, box_index = edges[number[box_index]].portal, int(before[box_index])
+            string.append((portal, portal.boxes[box_index, :2]))
         return string[::-1], float(costs[id(goal)][0])
 
     def _reopen(self, limit: float) -> None:

@@ -143,6 +143,8 @@ class PortalGraph:
         index = next(index for index, portals in enumerate(self._levels) if portal in portals)
         costs = np.where([other is portal for other in self._levels[index]], 0, math.inf)
         for ways, portals in zip(self._ways_back[index:], self._levels[index + 1:], strict=True):
+            if costs.min() == math.inf:
+                return
             costs = (costs[:, None] + ways).min(axis=0)
             lengths = costs + [other.level + other.left for other in portals]
             costs[lengths >= self._limit] = math.inf
