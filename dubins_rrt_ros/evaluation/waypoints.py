@@ -29,8 +29,8 @@ VEHICLE = Vehicle(turning_radius=1.0, robot_radius=0.3)
 #: The maps, by name.
 MAPS = {"maze": lambda: load_map("maze"), "office": lambda: building("office", 1, 0).map}
 #: How the legs of the reference are planned, and the paths that are compared.
-LEG = Settings(samples=100, planning_time=0.3, seed=1, length_proof=False)
-WHOLE = Settings(samples=1000, planning_time=10.0, seed=1, length_proof=False)
+LEG = Settings(samples=100, planning_time=0.3, seed=1, length_proof=False, preferred_clearance=0.0)
+WHOLE = Settings(samples=1000, planning_time=10.0, seed=1, length_proof=False, preferred_clearance=0.0)
 
 
 def main() -> int:

@@ -43,7 +43,9 @@ class AuditedPath:
 
     def improves(self, other: "AuditedPath | None") -> bool:
         """Return True if this is worth a report after the other."""
-        return other is None or self.is_simple > other.is_simple or self.cost < other.cost - LEAST_IMPROVEMENT
+        if other is None or self.cost < other.cost - LEAST_IMPROVEMENT:
+            return True
+        return self.is_simple > other.is_simple and self.path != other.path
 
 
 def success_message(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], elapsed: float, *,

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from dubins_rrt_ros.planning.plan_file import to_document
 HALL = shapely.box(0, 0, 12, 10).difference(shapely.box(5, 0, 6, 6))
 FOOTPRINT = "[[0.5, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.5, -0.3]]"
 DISC = ["--robot-radius", "0.3"]
+PROBLEM = Problem(PolygonMap(HALL), Vehicle(robot_radius=0.3), (2.0, 2.0, 1.57), (9.0, 2.0, -1.57))
+SETTINGS = Settings(samples=150, planning_time=60.0, seed=4)
 
 
 @pytest.fixture(autouse=True)
@@ -27,8 +30,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def document():
     """A plan as `dubins_rrt plan --json` writes it."""
-    problem = Problem(PolygonMap(HALL), Vehicle(robot_radius=0.3), (2.0, 2.0, 1.57), (9.0, 2.0, -1.57))
-    return to_document(plan(problem, Settings(samples=150, planning_time=60.0, seed=4)), "hall.wkt")
+    return to_document(plan(PROBLEM, SETTINGS), "hall.wkt")
 
 
 def write(document, name="path.json"):
@@ -112,7 +114,8 @@ def test_the_poses_of_a_plan_are_judged_for_they_are_driven(document, capsys):
         assert status == 1 and says in out, says
 
 
-def test_a_plan_of_an_earlier_version_is_judged(document, capsys):
+def test_a_plan_of_an_earlier_version_is_judged(capsys):
+    document = to_document(plan(PROBLEM, replace(SETTINGS, preferred_clearance=0.0)), "hall.wkt")
     later = {"stop_gap", "length_proof", "preferred_clearance", "clearance_weight", "cost_weight", "start_slack"}
     old = document | {"settings": {name: value for name, value in document["settings"].items() if name not in later}}
     assert run(write(old), "hall.wkt", capsys=capsys)[0] == 0

@@ -73,7 +73,8 @@ def test_a_line_tells_what_plan_does(capsys):
     assert [(line["problem"], line["seed"]) for line in lines] == [("hall", 0), ("hall", 1), ("block", 0), ("block", 1)]
     for line, case in zip(lines, (entry(), entry(), block, block), strict=True):
         problem = Problem(load_map(Path("set", case["map"])), Vehicle(case["turning_radius"], 0.195), case["start"], case["goal"])
-        settings = Settings(samples=150, planning_time=3600, goal_bias=0.2, heading_sampling="goal", seed=line["seed"])
+        settings = Settings(samples=150, planning_time=3600, goal_bias=0.2, heading_sampling="goal", seed=line["seed"],
+                            preferred_clearance=0.0)
         answer = plan(problem, settings)
         assert line["planner"] == "rrt_star" and line["solved"] and line["error_name"] == "NONE" and line["audit"] == "ok"
         assert line["final_cost"] == answer.length and line["path"] == answer.path.poses(0.05).tolist()
@@ -213,7 +214,8 @@ def test_every_option_of_vehicle_request_and_settings_is_a_key():
     vehicle = Vehicle(footprint=footprint, **wheels)
     problem = Problem(load_map("set/hall.wkt"), vehicle, START, GOAL, goal_tolerance_xy=0.5, any_goal_heading=True)
     for line in lines:
-        answer = plan(problem, Settings(planner="rrt", samples=120, planning_time=3600, seed=line["seed"], shortcut=False))
+        answer = plan(problem, Settings(planner="rrt", samples=120, planning_time=3600, seed=line["seed"], shortcut=False,
+                                        preferred_clearance=0.0))
         assert line["planner"] == "rrt" and line["time_limit"] == 3600
         assert line["path"] == (answer.path.poses(0.05).tolist() if answer.path else [])
 

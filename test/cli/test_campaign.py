@@ -28,7 +28,8 @@ def walled_trial(fits=None, start=START, turning_radius=0.5, walled_off=False, *
     data = np.zeros((14, 20))
     data[:14 if walled_off else 10, 9:11] = 100
     problem = Problem(GridMap(data, 0.5), Vehicle(turning_radius, 0.4), start, GOAL)
-    return Trial("walled", problem, Settings(**{"samples": 60, "planning_time": AMPLE_TIME, "seed": 1, **settings}), fits)
+    defaults = {"samples": 60, "planning_time": AMPLE_TIME, "seed": 1, "preferred_clearance": 0.0}
+    return Trial("walled", problem, Settings(**{**defaults, **settings}), fits)
 
 
 def findings_of(trial, monkeypatch, number=0):

@@ -161,7 +161,7 @@ def test_csv_and_json_hold_the_same_poses_from_start_to_goal(hall, capsys):
 
 def test_the_plot_shows_the_planned_path(hall, capsys):
     from matplotlib.image import imread
-    assert run(hall, *REQUEST, *BUDGET, "--plot", "p.png", capsys=capsys)[0] == 0
+    assert run(hall, *REQUEST, *BUDGET, "--preferred-clearance", "0", "--plot", "p.png", capsys=capsys)[0] == 0
     pixels = np.round(imread("p.png")[..., :3] * 255)
     assert (np.abs(pixels - [0xd5, 0x5e, 0x00]) < 3).all(axis=2).sum() > 2000
 

@@ -3,6 +3,8 @@
     python test/golden/record.py --write test/golden/record.json
     python test/golden/record.py --check test/golden/record.json
 
+The paths are the shortest; with `--preferred-clearance -1` they are those of the defaults, of which there is a record too.
+
 Paths and trees are kept as hashes, with their length and size. Compiled kernels only, and on one machine: other libraries of C or
 NumPy may round otherwise. A change that alters paths on purpose writes the record anew, in a commit of its own.
 """
@@ -13,6 +15,7 @@ import json
 import platform
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +39,8 @@ def main() -> int:
     what.add_argument("--check", metavar="FILE", type=Path, help="plan all requests and compare with a record")
     parser.add_argument("--peers", metavar="DIR", type=Path, default=None,
                         help="folder with maps of other projects, maps/NAME.yaml in it; requests on them are left out without it")
+    parser.add_argument("--preferred-clearance", metavar="m", type=float, default=0.0,
+                        help="of all requests but those that are not informed; default 0, the shortest paths")
     arguments = parser.parse_args()
     if not kernels_compiled:
         print("The kernels are interpreted; the record is of compiled ones: python setup.py build_ext --inplace", file=sys.stderr)
@@ -45,7 +50,8 @@ def main() -> int:
         print(f"{len(REQUESTS) - len(requests)} requests left out: their maps are not at hand (--peers DIR)")
     with ProcessPoolExecutor(2) as pool:
         answers = dict(zip((request.name for request in requests),
-                           pool.map(_answer, requests, [arguments.peers] * len(requests), chunksize=1), strict=True))
+                           pool.map(partial(_answer, peers=arguments.peers, preferred=arguments.preferred_clearance), requests,
+                                    chunksize=1), strict=True))
     if arguments.write:
         arguments.write.write_text(json.dumps({"made with": _machine(), "answers": answers}, indent=1) + "\n")
         print(f"{len(answers)} answers written to {arguments.write}")
@@ -69,11 +75,11 @@ def _compare(record: dict[str, Any], answers: dict[str, Any]) -> int:
     return 1 if differences or forgotten or not answers else 0
 
 
-def _answer(request: Request, peers: Path | None) -> dict[str, Any]:
+def _answer(request: Request, peers: Path | None, preferred: float) -> dict[str, Any]:
     """The answer to a request, in figures and hashes."""
     world_map = load_map(_map_file(request, peers))
     problem = Problem(world_map, Vehicle(**request.vehicle), request.start, request.goal, **request.problem)
-    result = plan(problem, Settings(planning_time=3600.0, **request.settings))
+    result = plan(problem, Settings(planning_time=3600.0, preferred_clearance=preferred, **request.settings))
     length = repr(float(result.path.length)) if result.path else None
     return {"status": result.status.name, "samples": int(result.samples), "nodes": len(result.tree), "length": length,
             "path": _path_hash(result), "tree": _tree_hash(result)}

@@ -52,7 +52,7 @@ def plans():
     cells = np.zeros((100, 100), dtype=np.int8)
     cells[40:60, 40:60] = 100
     grid = GridMap(cells, 0.1)
-    settings = Settings(samples=300, planning_time=20.0, seed=1)
+    settings = Settings(samples=300, planning_time=20.0, seed=1, preferred_clearance=0.0)
     start = (1.5, 5.0, 0.0)
     return {name: plan(Problem(grid, Vehicle(), start, goal), settings)
             for name, goal in {"solved": (8.5, 5.0, 0.5), "blocked": (5.0, 5.0, 0.0)}.items()}

@@ -14,7 +14,8 @@ ENTRY, BAY, ACROSS = (2.5, 8.75, 0.0), (22.0, 4.1, -1.5708), (5.0, 9.0, 1.5708)
 
 @pytest.fixture(scope="module")
 def running(module_planners):
-    process = module_planners.start(map_file="parking.geojson", turning_radius=5.0, footprint=CAR, seed=1, planning_time=15.0)
+    process = module_planners.start(map_file="parking.geojson", turning_radius=5.0, footprint=CAR, seed=1, planning_time=15.0,
+                                    preferred_clearance=0.0)
     return process, module_planners.client()
 
 

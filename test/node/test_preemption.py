@@ -94,7 +94,7 @@ def test_a_goal_that_is_refused_replaces_the_one_before(talk):
 
 
 def test_improvements_have_one_plan_id_and_rising_revisions_and_the_last_is_told(talk):
-    talk = talk(samples=4000, planning_time=15.0, seed=1)
+    talk = talk(samples=4000, planning_time=15.0, seed=1, preferred_clearance=0.0)
     talk.goal(GOAL, samples="4000")
     told = [values for values in map(values_of, talk.client.statuses) if values["plan_id"] != "0"]  # or: no start is there yet
     assert {item["plan_id"] for item in told} == {"1"}

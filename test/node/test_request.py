@@ -26,7 +26,8 @@ def problem():
 def request_for(problem):
     """A function that makes a request whose map is prepared."""
     def make(wanted=problem, **settings):
-        return PlanRequest(*route_of(wanted), Settings(**settings), in_future(prepare(wanted.map, wanted.vehicle)))
+        options = {"preferred_clearance": 0.0, **settings}
+        return PlanRequest(*route_of(wanted), Settings(**options), in_future(prepare(wanted.map, wanted.vehicle)))
     return make
 
 

@@ -227,7 +227,8 @@ def test_around_what_an_inflated_costmap_knows_of_where_the_detour_is_short():
     vehicle = Vehicle(turning_radius=0.6, robot_radius=0.2)
     data = inflated(occupied, 0.05, 0.2, 1.5, 2.0)
     problem = Problem(GridMap(data, 0.05, thresholds=COSTMAP), vehicle, (1.0, 4.0, 0.0), (7.0, 4.0, 0.0))
-    near, far = (plan(problem, Settings(seed=1, cost_weight=weight, samples=300, planning_time=10.0)) for weight in (0.01, 5.0))
+    near, far = (plan(problem, Settings(seed=1, cost_weight=weight, samples=300, planning_time=10.0, preferred_clearance=0.0))
+                 for weight in (0.01, 5.0))
     assert near.min_clearance < 0.3 and far.min_clearance > 0.7 and near.length < far.length < 7.5
 
 
@@ -242,6 +243,6 @@ def test_over_a_grid_of_probabilities_as_cartographer_makes_it():
     data[60:70, 20:30] = -1
     problem = Problem(GridMap(data, 0.05), Vehicle(turning_radius=0.5, robot_radius=0.2), (1.0, 1.0, 0.0), (7.0, 1.0, 0.0))
     assert plan(problem, Settings(seed=1)).status == Status.NO_VALID_PATH
-    result = plan(problem, Settings(seed=1, cost_weight=2.0, samples=300, planning_time=10.0))
+    result = plan(problem, Settings(seed=1, cost_weight=2.0, samples=300, planning_time=10.0, preferred_clearance=0.0))
     assert result.solved and result.cost > result.length + 0.5
     assert result.cost == pytest.approx(cost_of(result.path, result.problem, result.settings), rel=1e-3)

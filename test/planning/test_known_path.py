@@ -15,7 +15,7 @@ from dubins_rrt_ros.planning.curves.path import Path
 from dubins_rrt_ros.planning.search.known_path import KnownPath
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
-SETTINGS = Settings(samples=200, planning_time=120.0, seed=1)
+SETTINGS = Settings(samples=200, planning_time=120.0, seed=1, preferred_clearance=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -183,7 +184,7 @@ def test_every_path_crosses_the_levels_in_order(maze):
 @needs_compiled
 def test_the_gap_of_the_maze_is_closed(maze):
     """The bound by the eikonal equation is 5 % below the path."""
-    result = plan(maze, Settings(seed=1, samples=3000, length_proof=False))
+    result = plan(maze, Settings(seed=1, samples=3000, length_proof=False, preferred_clearance=0.0))
     assert result.gap > 0.04
     proof = LengthProof(maze, maze.world.field, result.path)
     proof.run(rounds(400), gap=0.015)
@@ -192,7 +193,7 @@ def test_the_gap_of_the_maze_is_closed(maze):
 
 @needs_compiled
 def test_a_proof_that_is_interrupted_as_it_begins_has_fewer_levels_and_holds(maze):
-    result = plan(maze, Settings(seed=1, samples=300))
+    result = plan(maze, Settings(seed=1, samples=300, preferred_clearance=0.0))
     for looks in (0, 2):
         proof = LengthProof(maze, maze.world.field, result.path, interrupted=rounds(looks))
         assert len(proof.levels) == looks
@@ -227,7 +228,7 @@ def test_no_bound_is_above_a_path_on_random_problems(seed):
 
 @needs_compiled
 def test_a_search_ends_as_soon_as_its_path_is_proved(maze):
-    settings = Settings(seed=1, samples=10_000_000, planning_time=60.0, stop_gap=0.02)
+    settings = Settings(seed=1, samples=10_000_000, planning_time=60.0, stop_gap=0.02, preferred_clearance=0.0)
     result = plan(maze, settings)
     assert result.gap <= 0.02 + 1e-9
     assert result.planning_time < 60
@@ -241,9 +242,10 @@ def test_a_search_ends_as_soon_as_its_path_is_proved(maze):
 @pytest.mark.parametrize("samples", [3000, 10_000_000])
 def test_on_one_core_the_proof_shares_it_with_the_search(maze, monkeypatch, samples):
     monkeypatch.setattr("dubins_rrt_ros.planning.search.background.cores", lambda: 1)
-    result = plan(maze, Settings(seed=1, samples=samples, planning_time=60.0, stop_gap=0.03))
+    settings = Settings(seed=1, samples=samples, planning_time=60.0, stop_gap=0.03, preferred_clearance=0.0)
+    result = plan(maze, settings)
     assert result.gap <= 0.03 + 1e-9 and result.samples < 10_000_000
-    assert result.path == plan(maze, Settings(seed=1, samples=result.samples, planning_time=60.0)).path
+    assert result.path == plan(maze, replace(settings, samples=result.samples, stop_gap=0.0)).path
 
 
 @needs_compiled
@@ -259,8 +261,8 @@ def test_the_gap_is_told_at_every_request_and_the_path_is_the_same(maze, monkeyp
     """On two cores, with the time that a proof needs; with neither it is left out."""
     monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 2)
     monkeypatch.setattr("dubins_rrt_ros.planning.search.background.cores", lambda: 2)
-    without = plan(maze, Settings(seed=1, samples=20_000, planning_time=60.0, length_proof=False))
-    beside = plan(maze, Settings(seed=1, samples=20_000, planning_time=60.0))
+    settings = Settings(seed=1, samples=20_000, planning_time=60.0, preferred_clearance=0.0)
+    without, beside = plan(maze, replace(settings, length_proof=False)), plan(maze, settings)
     assert beside.path == without.path and beside.samples == without.samples
     assert without.lower_bound < beside.lower_bound == beside.cost_lower_bound <= beside.length
     assert "proved" not in beside.message

@@ -54,7 +54,7 @@ def test_importing_the_planner_imports_no_matplotlib():
 def test_a_plan_is_drawn_on_axes_of_its_own_or_on_those_given():
     figure = matplotlib.figure.Figure()
     axes = figure.add_subplot()
-    result = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1))
+    result = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1, preferred_clearance=0.0))
     assert result.plot(axes) is axes and result.plot() is not axes
     assert f"{result.length:.2f} m" in axes.get_title()
     assert {"free", "obstacle", "path", "swept by the vehicle"} <= set(legend(axes))
@@ -76,7 +76,7 @@ def test_a_path_with_a_preferred_clearance_is_coloured_by_its_room():
     rooms = result.rooms()
     np.testing.assert_allclose(by_room.get_array(), (rooms[:-1] + rooms[1:]) / 2)
     assert rooms == pytest.approx((result.clearances() - 0.2) / 5.0)
-    assert plan(problem_here(), Settings(samples=20, planning_time=60.0)).rooms() is None
+    assert plan(problem_here(), Settings(samples=20, planning_time=60.0, preferred_clearance=0.0)).rooms() is None
 
 
 def test_a_map_and_a_tree_share_axes():

@@ -165,7 +165,7 @@ def test_progress_tells_of_every_better_path():
         snapshots.append(progress.snapshot())
 
     problem = Problem(walled_with_a_gap(), VEHICLE, START, GOAL)
-    result = plan(problem, settings("rrt_star"), on_progress=on_progress)
+    result = plan(problem, settings("rrt_star", preferred_clearance=0.0), on_progress=on_progress)
     assert result.status == Status.NONE
     assert " so far" not in result.message
     better = [progress.length for progress in told if progress.improved]

@@ -38,7 +38,8 @@ class Drawing:
         field = field_of(problem)
         self.problem, self.to_goal = problem, CostToGo.to_goal(problem, field).make_bound()
         self.from_start = CostToGo.from_start(problem, field).make_bound()
-        self.sampler = Sampler(problem, Settings(**{"seed": 1, "goal_bias": 0.0, **options}), field, self.to_goal)
+        settings = Settings(**{"seed": 1, "goal_bias": 0.0, "preferred_clearance": 0.0, **options})
+        self.sampler = Sampler(problem, settings, field, self.to_goal)
 
     def plain(self, count=2000):
         return self.sampler.draw(count)
@@ -172,7 +173,8 @@ def test_nodes_are_added_only_where_a_path_shorter_than_the_best_may_lead(shortc
     data[10:30, 19:21] = 100
     problem = Problem(GridMap(data, 0.5, (-10.0, -10.0, 0.0)), VEHICLE, START, GOAL)
     drawing = Drawing(problem)
-    search = search_on(problem, Settings(samples=scaled(4 * rrt.BLOCK, least=2 * rrt.BLOCK), seed=1, shortcut=shortcut))
+    search = search_on(problem, Settings(samples=scaled(4 * rrt.BLOCK, least=2 * rrt.BLOCK), seed=1, shortcut=shortcut,
+                                         preferred_clearance=0.0))
     at_blocks = []
     for _ in steps_of(search):
         if search.samples % rrt.BLOCK == 0 and search.length is not None:

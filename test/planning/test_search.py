@@ -87,19 +87,19 @@ def test_another_seed_gives_another_tree(problem):
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"step_size": 0.8}, {"shortcut": False}, {"informed": False}, {"planner": "rrt"}])
 def test_a_smaller_budget_is_the_beginning_of_a_larger_one(problem, options, monkeypatch):
-    """So a plan that was cut short can be had again with the samples that it took; and more of them never give a longer path."""
+    """So a plan that was cut short can be had again with the samples that it took; and more of them never give a dearer path."""
     monkeypatch.setattr(rrt, "BATCH_TIME", 1e-9)  # batches of one sample, but for the first, of eight
-    whole, lengths = search_on(problem, Settings(samples=BUDGETS[-1], seed=1, **options)), []
+    whole, costs = search_on(problem, Settings(samples=BUDGETS[-1], seed=1, **options)), []
     steps, may_end = whole.run(), True
     for budget in BUDGETS:
         part = searched(problem, samples=budget, **options)
         assert part.samples <= budget or options.get("informed", True)  # which goes on up to a path
-        lengths.append(math.inf if part.length is None else part.length)
+        costs.append(part.cost)
         while whole.samples < part.samples or whole.best < 0 <= part.best or not may_end:
             may_end = next(steps)
         if part.samples not in (1, 7):
             assert (whole.samples, contents(whole)) == (part.samples, contents(part))
-    assert lengths == sorted(lengths, reverse=True)
+    assert costs == sorted(costs, reverse=True)
 
 
 @needs_compiled
@@ -122,7 +122,7 @@ def test_the_best_path_on_random_problems(seed):
     if clearance(np.array([problem.start[:2]]))[0] < problem.vehicle.robot_radius:
         return
     step, best = float(rng.choice([0.0, 0.5])), math.inf
-    search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step))
+    search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step, preferred_clearance=0.0))
     for _ in steps_of(search):
         if search.best >= 0:
             assert search.length <= best
@@ -156,7 +156,7 @@ def test_what_is_left_out_would_not_have_helped():
         problem = Problem(loose.map, loose.vehicle, loose.start, loose.goal, allow_unknown=loose.allow_unknown)
         if clearance(np.array([problem.start[:2], problem.goal[:2]])).min() < problem.vehicle.robot_radius:
             continue
-        pruned = searched(problem, samples=3000, seed=seed).length
+        pruned = searched(problem, samples=3000, seed=seed, preferred_clearance=0.0).length
         all_kept = searched(problem, samples=5000, seed=seed, informed=False).length
         if pruned and all_kept:
             ratios.append(pruned / all_kept)

@@ -39,7 +39,8 @@ def test_invariants_hold_after_every_step(kind, planner, step_size, options):
     for seed in range(3 if SCALE == 1 else 1):
         problem = problem_on(kind, seed)
         field = ClearanceField(problem.map)
-        settings = Settings(planner=planner, samples=scaled(1200, least=100), step_size=step_size, seed=seed, **options)
+        settings = Settings(planner=planner, samples=scaled(1200, least=100), step_size=step_size, seed=seed,
+                            preferred_clearance=0.0, **options)
         search = search_on(problem, settings)
         for _ in steps_of(search):
             tree = search.tree
@@ -66,7 +67,7 @@ def test_edges_are_free_by_dense_sampling(kind):
 @pytest.fixture(scope="module")
 def small():
     """A tree to be corrupted, and the field that it was grown in."""
-    search, field = grown(samples=100)
+    search, field = grown(samples=100, preferred_clearance=0.0)
     tree = search.tree
     tree.check(field, VEHICLE)
     return tree, field

@@ -35,7 +35,7 @@ from dubins_rrt_ros.planning.stops import legs_along, stops_of
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
-SETTINGS = Settings(samples=200, planning_time=120.0, seed=1)
+SETTINGS = Settings(samples=200, planning_time=120.0, seed=1, preferred_clearance=0.0)
 #: Free places of the yard, around its box.
 BELOW, ABOVE = (5.0, 3.0), (5.0, 7.0)
 

@@ -12,6 +12,7 @@ import shapely
 
 from dubins_rrt_ros.planning import GridMap, Path, PolygonMap, Problem, Vehicle, World, _kernels, kernels_compiled
 from dubins_rrt_ros.planning.curves.dubins import shortest
+from dubins_rrt_ros.planning.search.cost import Objective
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
 from dubins_rrt_ros.planning.search.rrt import Search
 from support import naive
@@ -135,7 +136,7 @@ def field_of(problem):
 def search_on(problem, settings):
     """A search that has not begun."""
     field = field_of(problem)
-    return Search(problem, settings, field, CostToGo.to_goal(problem, field))
+    return Search(problem, settings, field, CostToGo.to_goal(problem, field, Objective.of(problem, settings, field)))
 
 
 def steps_of(search):

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     for name in names:
         if name not in (*FAMILIES, WAYS):
             raise UsageError(f"there is no family {name!r}; there are {', '.join((*FAMILIES, WAYS))}")
-    settings = Settings(planning_time=arguments.time, seed=arguments.seed)
+    settings = Settings(planning_time=arguments.time, seed=arguments.seed, preferred_clearance=0.0)
     tasks = [(name, number) for name in names for number in range(arguments.problems)]
     planned = with_bar((_line(name, number, settings) for name, number in tasks), len(tasks), " problems")
     lines = list(_written(planned, arguments.out))

@@ -34,7 +34,8 @@ def measured(number: int, settings: Settings) -> dict[str, Any]:
 
 
 def _reference(problem: Problem, lengths: list[float]) -> float:
-    long_runs = [plan(problem, Settings(samples=REFERENCE_SAMPLES, planning_time=60.0, seed=100 + seed)) for seed in range(2)]
+    long_runs = [plan(problem, Settings(samples=REFERENCE_SAMPLES, planning_time=60.0, seed=100 + seed, preferred_clearance=0.0))
+                 for seed in range(2)]
     paths = [answer.path for answer in long_runs if answer.path]
     best = min(paths, key=lambda path: path.length, default=None)
     others = _lengths_around(best, problem) if best else ()
@@ -50,7 +51,8 @@ def _lengths_around(path: Path, problem: Problem) -> Iterator[float]:
     for place in path.at(np.linspace(0, 1, CLOSED_PLACES + 2)[1:-1])[:, :2]:
         near = np.hypot(x - place[0], y[:, None] - place[1]) <= float(field.at(place)) + RESOLUTION
         closed = GridMap(np.where(near, OCCUPIED, data).astype(np.int8), RESOLUTION)
-        answer = plan(Problem(closed, problem.vehicle, problem.start, problem.goal), Settings(planning_time=CLOSED_TIME, seed=0))
+        answer = plan(Problem(closed, problem.vehicle, problem.start, problem.goal),
+                      Settings(planning_time=CLOSED_TIME, seed=0, preferred_clearance=0.0))
         if answer.length is not None:
             yield answer.length
 

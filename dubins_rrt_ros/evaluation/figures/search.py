@@ -56,8 +56,8 @@ EDGED: dict[str, Any] = {"linewidth": 2.2, "path_effects": [patheffects.withStro
 #: The planners compared: settings, number of samples to begin with, colour and marker.
 COMPARED: dict[str, tuple[Settings, int, str, str]] = {
     "plain RRT*": (Settings(informed=False, shortcut=False, heading_sampling="uniform"), 300, START, "o"),
-    "informed": (Settings(shortcut=False), 1, GOAL, "s"),
-    "informed, with shortcuts": (Settings(), 1, PATH, "^"),
+    "informed": (Settings(shortcut=False, preferred_clearance=0.0), 1, GOAL, "s"),
+    "informed, with shortcuts": (Settings(preferred_clearance=0.0), 1, PATH, "^"),
 }
 MARKS, SEEDS = (1, 10, 100, 300, 1000, 3000), range(5)
 
@@ -195,7 +195,8 @@ def first_and_final() -> tuple[Plan, Plan]:
         if progress.improved and not first:
             first.append(progress.snapshot())
 
-    final = plan(problem_in(MAZE), Settings(planning_time=NO_LIMIT, seed=SEED, length_proof=False), on_progress=keep_first)
+    final = plan(problem_in(MAZE), Settings(planning_time=NO_LIMIT, seed=SEED, length_proof=False, preferred_clearance=0.0),
+                 on_progress=keep_first)
     return first[0], final
 
 
