@@ -1,5 +1,6 @@
 """From a start and a goal to a request that a worker serves, and back to the executor with its outcome."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -23,6 +24,9 @@ OnEnd = Callable[[Outcome], None]
 OnImprovement = Callable[[Plan], None]
 #: Time that each worker gets to act on its cancellation at shutdown [s].
 SHUTDOWN_TIMEOUT = 0.2
+#: Maximum time that a search waits until its better path is published [s]. It takes a millisecond, but several where the search
+#: and its background have all cores.
+PUBLISHING_TIMEOUT = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +99,25 @@ class Dispatcher:
             finish: called in the worker's thread with the plan, before `on_end`: for what would keep the executor waiting.
         """
         outcome = Future()
-        improved = None if on_improvement is None else partial(self._post, on_improvement)
+        improved = None if on_improvement is None else partial(self._post_and_wait, on_improvement)
         job = worker.submit(partial(_serve, request, improved, finish), partial(self._post, self._end, outcome, on_end))
         self._under_way[outcome] = submission = Submission(job, outcome)
         return submission
 
     def _post(self, call: Callable[..., None], *arguments: object) -> None:
         self._queue.post(partial(call, *arguments))
+
+    def _post_and_wait(self, call: Callable[[Plan], None], plan: Plan) -> None:
+        made = threading.Event()
+
+        def make() -> None:
+            try:
+                call(plan)
+            finally:
+                made.set()
+
+        self._queue.post(make)
+        made.wait(PUBLISHING_TIMEOUT)
 
     def _end(self, awaited: Future, on_end: OnEnd, result: Plan | Exception) -> None:
         outcome = self._maps.with_remark(outcome_of(result, self._node))

@@ -20,6 +20,9 @@ from .planner_node import PlannerNode
 
 #: What ROS says of a list of lists in a parameter file.
 NESTED_LIST = "Sequences cannot be key"
+#: Time after which a thread gives up Python's lock to another [s], in place of 5 ms: a path is published beside a search that
+#: goes on, and each call of ROS gives up the lock.
+SWITCH_INTERVAL = 2e-4
 
 
 class ConfigurationError(Exception):
@@ -43,6 +46,7 @@ def _run(arguments: list[str], interruption: Interruption) -> int:
         if printed := _parse(arguments).printed:
             print(printed(), end="")
             return 0
+        sys.setswitchinterval(SWITCH_INTERVAL)
         node = _configured_node(arguments)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
