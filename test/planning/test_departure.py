@@ -96,6 +96,7 @@ def test_a_disc_leaves_a_wall(world_map, start, slack):
     assert_comes_no_nearer(answer, slack)
     refused = left(world_map, DISC, start, 0.0)
     assert refused.status == Status.START_OCCUPIED and not refused.start_too_near
+    assert refused.message.endswith(", or set start_slack if it can leave.")
 
 
 @needs_compiled

@@ -301,7 +301,8 @@ def test_a_footprint_that_touches_is_told_where(turned, status):
     assert (result.status == Status.START_OCCUPIED) == (status is not None)
     if status:
         assert result.message.startswith("Start is occupied: the footprint touches ")
-        assert result.message.endswith("; move or turn it, or make footprint smaller if the robot is.")
+        assert result.message.endswith("; move or turn it, or make footprint smaller if the robot is, or set start_slack if it "
+                                       "can leave.")
         assert result.location[0] in (pytest.approx(0.0), pytest.approx(1.0))
 
 

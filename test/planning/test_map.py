@@ -91,10 +91,14 @@ def test_a_truth_value_is_no_resolution():
 def test_a_grid_of_small_numbers_is_taken_with_a_warning():
     with pytest.warns(DoubtfulGrid, match="no value above 2, which stands for 2 % and is free"):
         GridMap([[0, 1, 2]], 1.0)
+    with pytest.warns(DoubtfulGrid, match="1 and 100 and no value between, and 1 stands for 1 % and is free"):
+        GridMap([[0, 1, -1, 100]], 1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for data, percent in (([[0, 1, 2]], True), ([[0, 10]], False), ([[0, 0]], False), ([[-1, 100]], False)):
-            GridMap(data, 1.0, percent=percent)
+        for data in ([[0, 10]], [[0, 0]], [[-1, 100]], [[0, 1, 2, 100]]):
+            GridMap(data, 1.0)
+        for data in ([[0, 1, 2]], [[0, 1, 100]]):
+            GridMap(data, 1.0, percent=True)
 
 
 def test_an_origin_in_degrees_is_taken_with_a_warning():

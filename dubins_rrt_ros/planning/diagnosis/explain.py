@@ -221,7 +221,7 @@ def _occupied(problem: Problem, field: ClearanceField, name: str, point: Point, 
     if clearance == 0 and what != MAP_EDGE:
         return f"{message}; {at(point)} lies in {_in_words(problem, obstacle)}; move it.", nearest
     where = f"nearest obstacle {'' if what == OBSTACLE else f'is {_in_words(problem, obstacle)} '}at {at(nearest)}"
-    return f"{message}; {where}; move it, or {_smaller(problem.vehicle)}.", nearest
+    return f"{message}; {where}; {_remedy_for_pose(problem, name, 'move it')}.", nearest
 
 
 def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose) -> tuple[str, Point]:
@@ -238,7 +238,7 @@ def _overlapping(problem: Problem, field: ClearanceField, name: str, pose: Pose)
         around = problem.map.window(pose[:2], 2 * problem.vehicle.robot_radius)
         if ClearanceField(around, allow_unknown=True).pose_is_free(pose, problem.vehicle):
             return f"{message}: {_remedy_for_unknown(obstacle)}.", nearest
-    return f"{message}; move or turn it, or {_smaller(problem.vehicle)}.", nearest
+    return f"{message}; {_remedy_for_pose(problem, name, 'move or turn it')}.", nearest
 
 
 def _in_words(problem: Problem, obstacle: Obstacle) -> str:
@@ -250,6 +250,12 @@ def _in_words(problem: Problem, obstacle: Obstacle) -> str:
     limits = problem.map.thresholds
     return (f"{UNKNOWN_SPACE}, a cell of {obstacle.value} % (free is up to {limits.free_up_to} %, occupied from "
             f"{limits.occupied_from} % on)")
+
+
+def _remedy_for_pose(problem: Problem, name: str, move: str) -> str:
+    """Return what to do about an end of the path that is too near to an obstacle; a vehicle may stand at such a start."""
+    slack = ", or set start_slack if it can leave" if name == "Start" and not problem.start_slack else ""
+    return f"{move}, or {_smaller(problem.vehicle)}{slack}"
 
 
 def _remedy_for_unknown(obstacle: Obstacle) -> str:

@@ -127,7 +127,7 @@ class GridMap(_PlottableMap):
             raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
         data = _percentages(data, self.name)
         if not percent:
-            _check_meaning(int(data.max()), self.name)
+            _check_meaning(data, self.name)
         resolution, origin = _checked_resolution(self.resolution, self.name), _checked_origin(self.origin, self.name)
         rows, columns = data.shape
         if resolution < FINEST or max(map(abs, (*origin[:2], rows * resolution, columns * resolution))) > FARTHEST:
@@ -304,14 +304,18 @@ def _check_name(name: Any) -> None:
         raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
 
 
-def _check_meaning(highest: int, name: str) -> None:
+def _check_meaning(data: np.ndarray, name: str) -> None:
     """Refuse a grid that is most likely one of 0 and 1, and warn of one that may be of small numbers for kinds of cells."""
+    highest = int(data.max())
     if highest == 1:
         raise MapError(f"{name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
                        "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
-    if 1 < highest < LEAST_PERCENT:
-        python_warnings.warn(f"{name}: cells hold no value above {highest}, which stands for {highest} % and is free; give 100 "
-                             "for an obstacle and -1 for unknown, or percent=True", DoubtfulGrid, stacklevel=4)
+    doubt = (f"no value above {highest}, which stands for {highest} %" if 1 < highest < LEAST_PERCENT else
+             "1 and 100 and no value between, and 1 stands for 1 %"
+             if highest == OCCUPIED and data.max(where=data < OCCUPIED, initial=FREE) == 1 else "")
+    if doubt:
+        python_warnings.warn(f"{name}: cells hold {doubt} and is free; give 100 for an obstacle and -1 for unknown, or "
+                             "percent=True", DoubtfulGrid, stacklevel=4)
 
 
 def _checked_resolution(resolution: Any, name: str) -> float:
