@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
@@ -159,10 +160,13 @@ class _Call:
 
     def _search(self, field: ClearanceField) -> Plan:
         """Search until the budget or the time is used up, the path found (RRT), or the request cancelled."""
+        self._deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
+        to_goal = self._cost_to_go_if_needed(field)
+        with closing(Search(self._problem, self._settings, field, to_goal, self._deadline, self._report_samples)) as search:
+            return self._run(search, field)
+
+    def _run(self, search: Search, field: ClearanceField) -> Plan:
         deadline = self._deadline
-        deadline.reserve = min(REASONS_SHARE * self._settings.planning_time, MOST_FOR_REASONS)
-        search = Search(self._problem, self._settings, field, self._cost_to_go_if_needed(field), deadline,
-                        self._report_samples)
         self._objective = search.objective
         self._proof = BackgroundProof(self._problem, field, self._settings, lambda: deadline.is_over, self._bound,
                                       search.objective.is_length)
@@ -382,7 +386,6 @@ class _Call:
         """Return the plan with a path that passed its audit."""
         # A path ends within rounding of the goal, and the shortest curve to there can be shorter by a full turn.
         bound, cost_bound, elapsed = min(self._bound, best.path.length), min(self._cost_bound, best.cost), self._elapsed
-        # With a clearance that is preferred, or costs of cells, the cost bounds what is minimised; else it is the length.
         proved = self._proof is not None and 0 < self._settings.stop_gap >= gap_above(cost_bound, best.cost) - SAME
         message = success_message(self._problem, self._settings, best, (bound, cost_bound), elapsed, cancelled=cancelled,
                                   running=running, proved=proved)

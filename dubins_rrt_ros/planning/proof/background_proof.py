@@ -56,9 +56,11 @@ class BackgroundProof:
     def _run(self, path: Path, bounds: LengthBounds | None) -> None:
         if self._is_interrupted():
             return
-        self._proof = LengthProof(self._problem, self._field, path, bounds, interrupted=self._is_interrupted)
-        self._proof.length = self._length
-        self._proof.run(self._is_interrupted, self._gap)
+        proof = self._proof = LengthProof(self._problem, self._field, path, bounds, interrupted=self._is_interrupted)
+        proof.length = self._length
+        proof.run(self._is_interrupted, self._gap)
+        if self._is_over:
+            self._proof = None
 
     def _is_interrupted(self) -> bool:
         return self._is_over or self._interrupted()
@@ -66,7 +68,8 @@ class BackgroundProof:
     @property
     def bound(self) -> float:
         """Length that no path falls below, as far as it is proved [m]."""
-        return max(self._least, self._proof.bound) if self._proof else self._least
+        proof = self._proof
+        return max(self._least, proof.bound) if proof else self._least
 
     @property
     def holds(self) -> bool:
@@ -81,4 +84,6 @@ class BackgroundProof:
         if self._waits and self._job and not self.holds and seconds > 0 and self._job.wait(seconds):
             self._job()
         self._is_over = True
-        return self.bound
+        self._least = self.bound
+        self._proof = self._job = None  # which refer to this object: large arrays would wait for the garbage collector
+        return self._least

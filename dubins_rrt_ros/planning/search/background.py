@@ -40,6 +40,11 @@ class BackgroundJob(Generic[Result]):
         return self._result.cache_info().currsize > 0 or (self._future is not None and self._future.done()
                                                           and not self._future.cancelled())
 
+    def cancel(self) -> None:
+        """Leave the job out unless it has begun: nobody will ask for its result."""
+        if self._future is not None:
+            self._future.cancel()
+
     def wait(self, seconds: float) -> bool:
         """Wait for so long; return True if the result is there, or is left to who asks for it."""
         return self._future is None or self._future.cancelled() or bool(wait_for([self._future], seconds).done)

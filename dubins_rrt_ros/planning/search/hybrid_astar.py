@@ -114,6 +114,11 @@ class HybridAStarRuns:
         job()
         return True
 
+    def cancel(self) -> None:
+        """Leave out what has not begun in the background."""
+        if self._in_background:
+            self._in_background.cancel()
+
     def collect(self) -> Path | None:
         """Return the path that was found in the background, or None, once."""
         found = self._in_background() if self._in_background else None

@@ -216,12 +216,14 @@ class Search:
         """Wait for so long until nothing of the search runs in the background; return True if so."""
         return self._informed is None or self._informed.runs.wait(seconds)
 
-    def make_bound(self, seconds: float = math.inf) -> CostToGo | None:
-        """Make the cost-to-go a lower bound, and return it.
+    def close(self) -> None:
+        """Leave out what has not begun in the background, where it would wait in vain behind that of other requests."""
+        if self._informed:
+            self._informed.runs.cancel()
+            self._informed.bounds.cancel()
 
-        Returns:
-            None unless the search is informed, and where what runs in the background does not end within that time.
-        """
+    def make_bound(self, seconds: float = math.inf) -> CostToGo | None:
+        """Make the cost-to-go a lower bound, and return it; None unless informed, and where that takes longer than `seconds`."""
         if not self._informed or not self.wait(seconds) or not self._informed.bounds.are_ready(seconds):
             return None
         return self._informed.bounds.make_to_goal()
