@@ -3,7 +3,7 @@
     python test/golden/record.py --write test/golden/record.json
     python test/golden/record.py --check test/golden/record.json
 
-The paths are the shortest; with `--preferred-clearance -1` they are those of the defaults, of which there is a record too.
+The paths are the shortest. With `--preferred-clearance -1` they keep room to the obstacles; record_room.json is of these.
 
 Paths and trees are kept as hashes, with their length and size. Compiled kernels only, and on one machine: other libraries of C or
 NumPy may round otherwise. A change that alters paths on purpose writes the record anew, in a commit of its own.
