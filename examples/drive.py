@@ -5,8 +5,9 @@
 
 The car follows `plan` by pure pursuit, with noise in its pose and lag in its steering. It is planned for with a radius 0.1 m
 larger than its body. One line of JSON tells of each goal, and a last one of the whole drive; a judge that is not the planner
-measures, from true poses, how near the body came to what was on the map. The exit status is 1 if it touched anything or reached
-no goal.
+measures, from true poses, how near the body came to what was on the map. `standstill` is the longest time without a path while
+nobody was near the car or where it is to go, `without_path` that in all cases. The exit status is 1 if it touched anything or
+reached no goal.
 """
 
 import argparse
@@ -49,9 +50,12 @@ SPECKLE = 2
 MOST_TRIES = 50
 #: Within this of the goal it is reached [m, rad]; a goal is given up after this time [s].
 REACHED_XY, REACHED_YAW, PATIENCE = 0.25, 0.5, 180.0
+#: Somebody who is so near to a car, a waypoint or the goal may leave no arc from it or to it [m].
+NEARBY = 1.5
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {"robot_radius": BODY + MARGIN, "turning_radius": TURNING_RADIUS, "replan_on_map_change": True, "replan_rate": 2.0,
-              "start_slack": MARGIN, "samples": 500, "planning_time": 1.0}
+              "start_slack": MARGIN, "samples": 500, "planning_time": 1.0,
+              "goal_tolerance_xy": 0.6 * REACHED_XY, "goal_tolerance_yaw": 0.6 * REACHED_YAW}
 
 
 @dataclass
@@ -189,8 +193,10 @@ class Car:
         self._last_place = places[-1]
         self._route = [np.array(place) for place in places]
         self.result = {"car": self.namespace, "goal": [round(a, 3) for a in places[-1]], "waypoints": len(places) - 1,
-                        "reached": False, "seconds": 0.0, "driven": 0.0, "plans": 0, "standstill": 0.0, "least_room": math.inf}
-        self._plan, self._stood = np.empty((0, 3)), 0.0
+                        "reached": False, "seconds": 0.0, "driven": 0.0, "plans": 0, "standstill": 0.0, "without_path": 0.0,
+                        "least_room": math.inf}
+        self._plan = np.empty((0, 3))
+        self._stood = self._without_path = 0.0
         message = PoseArray(poses=[pose_message(place) for place in places])
         message.header.frame_id = "map"
         self._routes.publish(message)
@@ -209,10 +215,10 @@ class Car:
     def step(self, seconds: float, others: list[np.ndarray]) -> None:
         """Drive on, be judged, and choose another goal where this one is reached."""
         driven = 0.0 if self._is_braking(others) else seconds * SPEED
-        if len(self._plan) == 0:
-            driven, self._stood = 0.0, self._stood + seconds
-        else:
-            self._stood = 0.0
+        is_lost = len(self._plan) == 0
+        self._without_path = self._without_path + seconds if is_lost else 0.0
+        self._stood = self._stood + seconds if is_lost and not self._is_hemmed_in(others) else 0.0
+        driven *= not is_lost
         if driven:
             self._curvature += (self._steered() - self._curvature) * min(1.0, seconds / STEERING_LAG)
             middle = self.pose[2] + driven * self._curvature / 2
@@ -221,6 +227,7 @@ class Car:
         result["seconds"] += seconds
         result["driven"] += driven
         result["standstill"] = max(result["standstill"], self._stood)
+        result["without_path"] = max(result["without_path"], self._without_path)
         result["least_room"] = min(result["least_room"], self._floor.room(*self.pose[:2]) - BODY,
                                    *(math.dist(self.pose[:2], person[:2]) - BODY - PERSON for person in self._floor.people),
                                    *(math.dist(self.pose[:2], other[:2]) - 2 * BODY for other in others))
@@ -251,6 +258,11 @@ class Car:
         across = -(tx - x) * math.sin(yaw) + (ty - y) * math.cos(yaw)
         curvature = 2 * across / max((tx - x) ** 2 + (ty - y) ** 2, 1e-6)
         return max(-MOST_CURVATURE, min(MOST_CURVATURE, curvature))
+
+    def _is_hemmed_in(self, others: list[np.ndarray]) -> bool:
+        """Return True if somebody is so near to the car, a waypoint or the goal that there may be no path."""
+        somebody = [*self._floor.people[:, :2], *(other[:2] for other in others)]
+        return any(math.dist(place[:2], body) < NEARBY for place in (self.pose, *self._route) for body in somebody)
 
     def _is_braking(self, others: list[np.ndarray]) -> bool:
         """Return True if the next metre of the path leads nearer to somebody who is near, as any driver sees.
@@ -323,6 +335,7 @@ def main() -> int:
     touched = [result for result in (*results, *(car.result for car in cars)) if result["least_room"] < 0]
     summary = {"goals": len(results), "reached": len(reached), "touched": len(touched),
                "longest_standstill": max((result["standstill"] for result in results), default=0.0),
+               "longest_without_path": max((result["without_path"] for result in results), default=0.0),
                "plans_a_second": round(sum(result["plans"] for result in results)
                                        / max(1.0, sum(result["seconds"] for result in results)), 2),
                "driven_over_shortest": round(sum(result["driven"] for result in reached)
