@@ -1,5 +1,6 @@
 """The command `planner`, which is `python -m dubins_rrt_ros.node` too: run the node, or say that ROS 2 is missing."""
 
+import signal
 import sys
 from importlib.util import find_spec
 
@@ -11,8 +12,9 @@ def main() -> int:
               file=sys.stderr)
         return 1
     try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         from .main import main as run
-    except KeyboardInterrupt:  # which ends a node regularly, also while it is imported
+    except KeyboardInterrupt:  # by SIGINT or SIGTERM, which end a node regularly, also while it is imported
         return 0
     return run()
 
