@@ -52,22 +52,19 @@ def too_high(ahead: np.ndarray, boxes: np.ndarray, radius: float, margin: float)
     return excess
 
 
-def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray) -> np.ndarray:
+def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
     """Return lower bounds of the curves from each of (n, 8) boxes to the box of the same row, at most `enough` (n,) [m]."""
-    least, row = enough.copy(), np.arange(len(a))
-    for halving in range(HALVINGS + 1):
-        found = _least_of_whole(a, b, radius, least[row])
-        short = np.flatnonzero(found < least[row])
-        # No more can be shown than for the poses in the middle: a little less is enough where that is too short.
-        middles = _least_of_whole(_middle(a[short]), _middle(b[short]), radius, least[row[short]])
-        less = np.maximum(middles - SHORT * radius, found[short])
-        np.minimum.at(least, row[short], np.where(middles < least[row[short]], less, np.inf))
-        short = short[found[short] < least[row[short]]]
-        if halving == HALVINGS or len(short) > MAX_PAIRS:
-            np.minimum.at(least, row[short], found[short])
-        if halving == HALVINGS or not 0 < len(short) <= MAX_PAIRS:
-            break
-        (a, b), row = _halves(a[short], b[short], radius), np.tile(row[short], 2)
+    least = np.minimum(_least_of_whole(a, b, radius, enough), enough)
+    short = np.flatnonzero(least < enough)
+    if halvings == 0 or not 0 < len(short) <= MAX_PAIRS:
+        return least
+    # No more can be shown than for the poses in the middle: a little less is enough where that is too short.
+    middles = _least_of_whole(_middle(a[short]), _middle(b[short]), radius, enough[short])
+    wanted = np.where(middles < enough[short], np.maximum(middles - SHORT * radius, least[short]), enough[short])
+    some = least[short] < wanted
+    short, wanted = short[some], wanted[some]
+    parts = least_length(*_halves(a[short], b[short], radius), radius, np.tile(wanted, 2), halvings - 1)
+    least[short] = np.minimum(*np.split(parts, 2))
     return least
 
 
@@ -80,20 +77,16 @@ def _middle(boxes: np.ndarray) -> np.ndarray:
 
 def _halves(a: np.ndarray, b: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Return both halves of pairs of boxes: of each pair the interval that matters most is halved."""
-    a, b = np.tile(a, (2, 1)), np.tile(b, (2, 1))
-    ranges = np.stack([radius * a[:, 7], radius * b[:, 7], a[:, 4], b[:, 4], a[:, 5], b[:, 5]])
-    widest, sign = ranges.argmax(axis=0), np.repeat((-1, 1), len(a) // 2)
-    for number, (box, half, x, y) in enumerate(((a, 7, None, None), (b, 7, None, None), (a, 4, 2, 3), (b, 4, 2, 3),
-                                                (a, 5, 3, 2), (b, 5, 3, 2))):
-        some = np.flatnonzero(widest == number)
-        box[some, half] /= 2
-        if x is None:
-            box[some, 6] += sign[some] * box[some, 7]
-        else:
-            flip = -1 if half == 5 else 1  # the width is at a right angle to the direction
-            box[some, 0] += flip * sign[some] * box[some, half] * box[some, x]
-            box[some, 1] += sign[some] * box[some, half] * box[some, y]
-    return a, b
+    widest = np.stack([size for box in (a, b) for size in (radius * box[:, 7], box[:, 4], box[:, 5])]).argmax(axis=0)
+    sign, halves = np.repeat((-1, 1), len(a)), [np.tile(box, (2, 1)) for box in (a, b)]
+    for number, box in enumerate(halves):
+        heading, along, across = (np.flatnonzero(np.tile(widest == 3 * number + kind, 2)) for kind in range(3))
+        box[heading, 7] /= 2
+        box[heading, 6] += sign[heading] * box[heading, 7]
+        for some, half, direction in ((along, 4, box[along, 2:4]), (across, 5, box[across, 3:1:-1] * (-1, 1))):
+            box[some, half] /= 2
+            box[some, :2] += (sign[some] * box[some, half])[:, None] * direction
+    return halves[0], halves[1]
 
 
 def _least_of_whole(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray) -> np.ndarray:
