@@ -33,11 +33,11 @@ TESTS = Path(__file__).resolve().parents[1]
 TESTS_OF = {f"dubins_rrt_ros.{module}": [str(TESTS / f"{test}.py") for test in tests.split()] for module, tests in {
     "checker.bounds": "checker/test_bounds checker/test_spoils", "checker.check": "checker/test_spoils checker/test_check",
     "checker.levels": "checker/test_levels checker/test_spoils", "checker.maps": "checker/test_maps",
-    "planning.audit.cost": "planning/test_cost", "planning.audit.departure": "planning/test_departure",
+    "planning.audit.cost": "planning/test_audit_cost", "planning.audit.departure": "planning/test_departure",
     "planning.audit.obstacles": "planning/test_audit planning/test_audit_footprint",
     "planning.audit.sweep": "planning/test_audit planning/test_audit_footprint",
     "planning.audit.verdict": "planning/test_audit planning/test_audit_footprint",
-    "planning.audit.edges": "planning/test_audit_poses", "planning.audit.poses": "planning/test_audit_poses"}.items()}
+    "planning.audit.poses": "planning/test_audit_poses"}.items()}
 
 
 @dataclass(frozen=True)
