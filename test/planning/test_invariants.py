@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.cases import empty_map, path_over, random_maps, random_pose, random_problem, scaled, search_on, steps_of
+from support.cases import (
+    empty_map,
+    needs_compiled,
+    path_over,
+    random_maps,
+    random_pose,
+    random_problem,
+    scaled,
+    search_on,
+    steps_of,
+)
 from support.planner_cases import GOAL, START, VEHICLE, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import (
@@ -15,6 +25,7 @@ from dubins_rrt_ros.planning import (
     ClearanceField,
     CurveError,
     DubinsCurve,
+    GridMap,
     Path,
     PathError,
     PlanError,
@@ -22,6 +33,7 @@ from dubins_rrt_ros.planning import (
     Settings,
     Status,
     TreeError,
+    Vehicle,
     plan,
 )
 from dubins_rrt_ros.planning.curves.dubins import shortest
@@ -113,6 +125,17 @@ def a_problem(seed):
     drawn = (random_problem(rng, random_maps(30)[index % 30]) for index in range(seed, seed + 60))
     return next(problem for problem, clearance in drawn
                 if clearance(np.array([problem.start[:2]]))[0] > problem.vehicle.robot_radius)
+
+
+@needs_compiled
+@pytest.mark.parametrize(("x", "y"), [(3e6, 4.8e6), (9.9e7, -9.9e7)], ids=["utm", "largest"])
+def test_answers_hold_far_from_the_origin(x, y):
+    c, s = math.cos(1.0), math.sin(1.0)
+    world_map = GridMap(np.zeros((100, 100), np.int8), 0.1, (x, y, 1.0))
+    start, goal = ((x + c * u - s * v, y + s * u + c * v, theta) for u, v, theta in ((2.0, 3.0, 2.0), (8.0, 7.0, 3.1)))
+    answer = plan(Problem(world_map, Vehicle(0.02, 0.1), start, goal), Settings(samples=100, seed=1, planning_time=60))
+    assert answer.solved
+    answer.check()
 
 
 # What is broken is found
