@@ -20,7 +20,7 @@ from dubins_rrt_ros.planning.vehicle import overridden
 
 from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, write_proof
 from .common.example import ENDS, EXAMPLE, MAP
-from .common.flags import add_option_flags, add_paper_flag, flag, given_options, given_settings
+from .common.flags import LengthSettings, add_option_flags, add_paper_flag, flag, given_options, given_settings
 from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
@@ -87,7 +87,7 @@ def add_request_arguments(parser: Parser, certified: bool = False) -> list[argpa
                                  "it is passed with the heading that makes the whole path shortest")
     parser.add_argument("--degrees", action="store_true", default=argparse.SUPPRESS,
                         help="take the yaws of all poses in degrees; what is written stays in radians")
-    for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", Settings)):
+    for title, cls in (("vehicle", Vehicle), ("request", Problem), ("settings", LengthSettings if certified else Settings)):
         add_option_flags(parser, title, cls, without=UNCERTIFIED if certified else ())
     add_paper_flag(parser)
     return required

@@ -17,8 +17,19 @@ MIN_PLANNING_TIME = 0.001
 MIN_SPACING = 0.001
 #: Share of the preferred clearance from which on a place counts as roomy: at corners the best path is a little inside it.
 ROOMY = 0.8
+#: The preferred clearance that stands for the vehicle's inscribed radius.
+INSCRIBED = -1.0
 #: The options of the paper's plain algorithms.
 PAPER = {"informed": False, "shortcut": False, "heading_sampling": "uniform"}
+#: The option that makes the length what is minimised.
+SHORTEST = {"preferred_clearance": 0.0}
+
+
+def preferred_clearance_option(default: float) -> Any:
+    """Return the option, also for settings with another default."""
+    return option(default, "distance of the vehicle's outline from the nearest obstacle below which a metre costs more; 0 seeks "
+                  "the shortest path, -1 is the inscribed radius; without effect with informed: false", unit="m", low=INSCRIBED,
+                  high=1000.0)
 
 
 @documented
@@ -48,9 +59,7 @@ class Settings:
         "there around obstacles; mixed, a fifth uniform, the others near field", choices=("uniform", "goal", "field", "mixed"))
     informed: bool = option(True, "find a first path by hybrid A*, then have rrt_star sample only where it can become shorter")
     shortcut: bool = option(True, "shorten each best path by Dubins shortcuts and vertex perturbation, and grow the tree from it")
-    preferred_clearance: float = option(
-        0.0, "distance of the vehicle's outline from the nearest obstacle below which a metre costs more; 0 seeks the shortest "
-        "path, -1 is the inscribed radius; without effect with informed: false", unit="m", low=-1.0, high=1000.0)
+    preferred_clearance: float = preferred_clearance_option(INSCRIBED)
     clearance_weight: float = option(2.0, "extra cost of a metre in contact: a metre costs 1 + clearance_weight * "
                                      "(1 - room / preferred_clearance)^2", low=0.0, high=100.0)
     cost_weight: float = option(
@@ -73,7 +82,7 @@ class Settings:
         check_function("sampler", self.sampler)
         if 0 < self.path_spacing < MIN_SPACING:
             raise OptionError(f"path_spacing is {self.path_spacing:g}; give 0 or at least {MIN_SPACING:g} [m]")
-        if -1 < self.preferred_clearance < 0:
+        if INSCRIBED < self.preferred_clearance < 0:
             raise OptionError(f"preferred_clearance is {self.preferred_clearance:g}; give a distance [m], 0 for the shortest "
                               "path, or -1 for the inscribed radius")
 
@@ -81,7 +90,7 @@ class Settings:
         """Return the room that a vehicle prefers [m]; 0 where the cost is the length."""
         if not self.informed or self.clearance_weight == 0:
             return 0.0
-        return vehicle.inscribed_radius if self.preferred_clearance == -1 else self.preferred_clearance
+        return vehicle.inscribed_radius if self.preferred_clearance == INSCRIBED else self.preferred_clearance
 
     @property
     def weight_of_cells(self) -> float:

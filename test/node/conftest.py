@@ -100,6 +100,17 @@ def installed_planners():
     yield from _planners(installed=True)
 
 
+@pytest.fixture
+def lean_planners(installed_planners, monkeypatch):
+    """The same where the C library gives memory back as soon as it is free.
+
+    Else what a node holds at rest depends on the holes between what was freed, which are tens of MB and grow for minutes.
+    """
+    for name, value in {"ARENA_MAX": "1", "MMAP_THRESHOLD_": "65536", "TRIM_THRESHOLD_": "65536"}.items():
+        monkeypatch.setenv(f"MALLOC_{name}", value)  # a fork would keep the allocator of its parent
+    return installed_planners
+
+
 def _planners(installed: bool = False):
     pytest.importorskip("rclpy", reason="rclpy is not installed")
     from support.harness import Planners

@@ -36,9 +36,9 @@ def report(record_property):
 
 
 @pytest.mark.slow
-def test_a_thousand_goals_leave_nothing_behind(planners, map_yaml, record_property):
-    process = planners.start(map_file=str(map_yaml), planner="rrt", planning_time=15.0, path_spacing=0.5)
-    talk = Conversation(process, planners.client(listens_to_tree=True))
+def test_a_thousand_goals_leave_nothing_behind(lean_planners, map_yaml, record_property):
+    process = lean_planners.start(map_file=str(map_yaml), planner="rrt", planning_time=15.0, path_spacing=0.5)
+    talk = Conversation(process, lean_planners.client(listens_to_tree=True))
     talk.client.send("start_pose", START)
     for count in range(1, 1001):
         told = talk.goal(GOALS[count % len(GOALS)])

@@ -26,23 +26,18 @@ RESTS = 24
 #: How much more memory the node may hold in the last third of the rests than in the second [MB], both at the least and at the
 #: most: at rest it is always in the same state. In an hour a leak of 10 kB/s, some 2 kB a request, is found.
 GROWTH = 10.0
-#: Has the C library give memory back as soon as it is free: else what is at rest depends on the holes between what was freed,
-#: which are tens of MB and grow for minutes.
-ALLOCATOR = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
 #: How much of the node's log a failure shows [characters].
 LOG = 5000
 
 
 @pytest.mark.slow
 @pytest.mark.minute
-def test_soak(installed_planners, request, record_property, monkeypatch):
+def test_soak(lean_planners, request, record_property):
     seconds, seed = request.config.getoption("--soak"), request.config.getoption("--soak-seed")
     seed = int(np.random.SeedSequence().entropy % 2**31) if seed is None else seed
     print(f"repeat it with --soak {seconds:g} --soak-seed {seed}")
-    for name, value in ALLOCATOR.items():
-        monkeypatch.setenv(name, value)
-    process = installed_planners.start(**AT_REST)  # a fork would keep the allocator of its parent
-    soak = Soak(installed_planners.client(listens_to_tree=True), np.random.default_rng(seed))
+    process = lean_planners.start(**AT_REST)
+    soak = Soak(lean_planners.client(listens_to_tree=True), np.random.default_rng(seed))
     memory, others = [], []
     begin = time.monotonic()
     try:

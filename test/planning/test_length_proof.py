@@ -301,4 +301,4 @@ def test_a_path_that_is_the_dubins_curve_needs_no_proof(monkeypatch):
 def test_on_one_core_nothing_is_proved_without_a_gap_to_stop_at(maze, monkeypatch):
     monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 1)
     monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.LengthProof", never)
-    assert plan(maze, Settings(seed=1, samples=scaled(200))).solved
+    assert plan(maze, Settings(seed=1, samples=scaled(200), planning_time=60.0)).solved

@@ -195,7 +195,7 @@ def test_obstacles_of_many_corners_are_taken_from_the_bounds(bounds, obstacles):
 
 def test_a_path_goes_around_the_obstacles_of_polygons():
     problem = Problem(PolygonMap.of(SQUARE, [WALL]), Vehicle(turning_radius=0.5), (1, 1, 0), (9, 1, 0))
-    assert 9.5 < plan(problem, Settings(seed=1)).length < 11
+    assert 9.5 < plan(problem, Settings(planner="rrt", planning_time=60.0, seed=1)).length < 11
 
 
 @pytest.mark.parametrize("bounds, obstacles, reason", [

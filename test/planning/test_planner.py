@@ -104,7 +104,7 @@ def test_a_boxed_in_start_is_told(planner):
     data = np.zeros((40, 40))
     data[:, 22] = 100
     problem = Problem(GridMap(data, 0.5), Vehicle(1.0, 0.3), (10.55, 10.0, 0.0), (3.0, 3.0, 0.0))
-    result = plan(problem, settings(planner, samples=50, planning_time=0.3))
+    result = plan(problem, settings(planner, samples=50, planning_time=3.0))
     assert result.status == Status.NO_VALID_PATH
     assert "every forward arc from the start hits an obstacle within 0.16 m, the longest at (11.00, 9.99)" in result.message
     assert "move or turn the start" in result.message

@@ -116,20 +116,23 @@ def test_the_first_path_is_smoothed_and_another_sought_before_the_first_sample(p
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(scaled(30, least=3)))
 def test_the_best_path_on_random_problems(seed):
-    """Its length never rises, it reaches the goal free, no bound is above it, and the tree holds its invariants."""
+    """Its cost never rises, it reaches the goal free, no bound is above it, and the tree holds its invariants."""
     rng = np.random.default_rng(200 + seed)
     problem, clearance = random_problem(rng, random_maps(30)[seed])
     if clearance(np.array([problem.start[:2]]))[0] < problem.vehicle.robot_radius:
         return
     step, best = float(rng.choice([0.0, 0.5])), math.inf
-    search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step, preferred_clearance=0.0))
+    search = search_on(problem, Settings(samples=scaled(1000, least=100), seed=seed, step_size=step,
+                                         preferred_clearance=(0.0, -1.0)[seed % 2]))
     for _ in steps_of(search):
-        if search.best >= 0:
-            assert search.length <= best
-            best = search.length
+        assert search.cost <= best
+        best = search.cost
     tree = search.tree
     tree.check(field_of(problem), problem.vehicle)
-    np.testing.assert_allclose(tree.costs, naive.costs(tree.parents, tree.lengths), rtol=1e-12)
+    lengths = naive.costs(tree.parents, tree.lengths)
+    if search.objective.is_length:
+        np.testing.assert_allclose(tree.costs, lengths, rtol=1e-12)
+    assert (tree.costs >= lengths * (1 - 1e-12)).all()
     assert step == 0 or tree.lengths.sum(axis=1).max() <= step * (1 + 1e-9)
     problem = search.growing.problem  # whose goals are those nearest to the goal that was asked for
     off = np.hypot(*(tree.poses[:, :2] - problem.goal[:2]).T)
@@ -139,7 +142,8 @@ def test_the_best_path_on_random_problems(seed):
     assert (search.best >= 0) == reaching.any()
     if search.best >= 0:
         assert reaching[search.best]
-        assert search.length <= tree.costs[reaching].min() + 1e-9
+        assert search.cost <= tree.costs[reaching].min() + 1e-9
+        assert search.cost == pytest.approx(search.objective.path_cost(search.path), rel=1e-9)
         assert search.path == tree.path_to(search.best)
         assert audit_path(search.path, problem).ok
         bound = lower_bound(problem, CostToGo.to_goal(problem, field_of(problem)).make_bound())

@@ -12,9 +12,10 @@ from typing import Any
 
 from dubins_rrt_ros.planning import Settings
 from dubins_rrt_ros.planning.option import option
+from dubins_rrt_ros.planning.settings import SHORTEST
 
 from ..common.cluster import add_jobs_flags
-from ..common.flags import add_option_flags, add_paper_flag, given_settings, largest
+from ..common.flags import LengthSettings, add_option_flags, add_paper_flag, given_settings, largest
 from ..common.output import STDOUT, check_drawing, check_folder, finite, words_for, write_document
 from ..common.parser import Parser, UsageError, add_json_flag, describe
 from ..common.progress import with_bar
@@ -33,7 +34,7 @@ _OF_REPORT, _OF_BOTH = {"report", "best_known", "plot", "plot_samples"}, {"comma
 
 
 @dataclass(frozen=True)
-class _Flags(Settings):
+class _Flags(LengthSettings):
     """The settings that have flags here; those that are no option() are set by the bench in its own way."""
 
     samples: int = option(MAX_SAMPLES, "maximum number of samples", low=1, high=MAX_SAMPLES)
@@ -158,7 +159,7 @@ def _measure_deadlines(arguments: argparse.Namespace) -> int:
 def _measure_node(arguments: argparse.Namespace) -> int:
     """Time the answers of the node, and print how soon they come."""
     cases, count = _cases(arguments), _count(arguments, "seeds", default=latencies.REQUESTS)
-    settings = Settings(**given_settings(arguments, _Flags))
+    settings = Settings(**SHORTEST | given_settings(arguments, _Flags))
     if "time" in arguments:
         settings = replace(settings, planning_time=arguments.time)
     try:
@@ -213,7 +214,7 @@ def _settings(arguments: argparse.Namespace, of_problem: Mapping[str, Any]) -> S
     if "time" in arguments:
         given["planning_time"] = arguments.time
     default_time = MAX_TIME if "samples" in given else DEFAULT_TIME
-    return Settings(**{"samples": MAX_SAMPLES, "planning_time": default_time, **given})
+    return Settings(**{"samples": MAX_SAMPLES, "planning_time": default_time, **SHORTEST, **given})
 
 
 def _count(arguments: argparse.Namespace, name: str, default: int = 1) -> int:

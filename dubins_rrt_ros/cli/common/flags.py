@@ -2,11 +2,19 @@
 
 import argparse
 from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any
 
 from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.option import Option
-from dubins_rrt_ros.planning.settings import PAPER
+from dubins_rrt_ros.planning.settings import PAPER, SHORTEST, preferred_clearance_option
+
+
+@dataclass(frozen=True)
+class LengthSettings(Settings):
+    """The settings of commands that are about the length of paths, which by default is what is minimised."""
+
+    preferred_clearance: float = preferred_clearance_option(SHORTEST["preferred_clearance"])
 
 
 def add_option_flags(parser: argparse.ArgumentParser, title: str, cls: type, without: Collection[str] = ()) -> None:

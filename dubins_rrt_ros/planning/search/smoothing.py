@@ -50,7 +50,7 @@ def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.G
     while is_left and not work.is_over:
         checks = work.portion(pace.size)
         with pace.measured(checks):
-            checked = shortcutter.prepare(checks)
+            checked = int(shortcutter.prepare(checks))  # interpreted, it is one of NumPy's
         work.done += checked
         is_left = checked == checks
     while tried < tries and not work.is_over:
