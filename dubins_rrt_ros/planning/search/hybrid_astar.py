@@ -12,6 +12,7 @@ from .._kernels.collision import CollisionChecker
 from .._kernels.edge_cost import EdgeCost
 from .._kernels.hybrid_astar import HybridAStar
 from ..collision.clearance import ClearanceField
+from ..collision.raster import CLEARANCE_MARGIN
 from ..curves.path import Path
 from ..deadline import never
 from ..problem import Problem
@@ -22,6 +23,7 @@ from .cost import Objective
 from .cost_to_go import CostToGo
 from .goal_poses import goal_poses
 from .pace import Pace
+from .repair import repaired
 from .smoothing import smooth
 
 #: Runs up to the first path: length of their arcs in turning radii, and number of headings of their closed set. The finer runs
@@ -42,6 +44,12 @@ NARROW_RUNS = ((0.05, (0.2, 20.0), 128, 3.0, 0.5), (0.05, (0.2, 20.0), 128, 3.0,
 NARROW_EXPANSIONS, NARROW_GROWTH, MOST_NARROW_EXPANSIONS = 8192, 3, 262_144
 #: Number of random factors of the arcs of such a run; they are used in turn.
 FACTORS = 8192
+#: Runs for a disc that needs less clearance, whose paths are repaired, before those for narrow places: three kinds of these, each
+#: with the shares of the turning radius that it needs less; maximum of that as a share of its radius; poses that each expands.
+RELAXATIONS, MOST_RELAXATION, RELAXED_EXPANSIONS = (0.05, 0.1, 0.025), 0.5, 4096
+RELAXED_RUNS = tuple((*run, relaxation) for run in (NARROW_RUNS[0], NARROW_RUNS[3], NARROW_RUNS[2]) for relaxation in RELAXATIONS)
+#: Clearance beyond what the checker of the motions demands that a path is repaired to: it is measured at samples [m].
+REPAIR_MARGIN = 0.4 * CLEARANCE_MARGIN
 #: Next runs, which come closer and closer to the shortest path: length of arcs, number of headings, weight of the cost-to-go.
 NEXT_RUNS = ((0.4, 16, 1.1), (0.6, 16, 1.0), (0.4, 16, 1.0), (0.3, 24, 1.0))
 #: Range of the random length of arcs of all later runs, so that their closed sets differ; they weigh the cost-to-go as it is.
@@ -83,6 +91,7 @@ class HybridAStarRuns:
         self._in_background: BackgroundJob[Path | None] | None = None
         self._pace = Pace(FIRST_SLICE, LARGEST_SLICE)
         self._started = self._in_vain = 0
+        self._lacking = 0.0  # clearance that the path of the current run may lack [m]
         self.exhausted = False
 
     @cached_property
@@ -148,6 +157,8 @@ class HybridAStarRuns:
         if arrays := run.path():
             waypoints, words, lengths = arrays
             path = Path(waypoints, words, lengths, self._problem.vehicle.turning_radius)
+            if self._lacking > 0:
+                path = self._repaired(path, work)
         is_first = best_cost == math.inf
         if path and not is_first and self._settings.shortcut:
             for first_round in (True, False):
@@ -164,9 +175,11 @@ class HybridAStarRuns:
         self.exhausted = not is_first and self._in_vain == MOST_IN_VAIN
 
     def _next_run(self, best_cost: float) -> HybridAStar:
-        is_first = best_cost == math.inf
+        is_first, self._lacking = best_cost == math.inf, 0.0
         if is_first and self._in_vain >= len(FIRST_RUNS):
-            return self._narrow_run(self._in_vain - len(FIRST_RUNS))
+            relaxed = () if self._problem.vehicle.footprint else RELAXED_RUNS
+            number = self._in_vain - len(FIRST_RUNS)
+            return self._relaxed_run(*relaxed[number]) if number < len(relaxed) else self._narrow_run(number - len(relaxed))
         arc, headings, weight = self._measures(is_first)
         return self._new_run(arc, headings, weight, FIRST_VISIT_PENALTY if is_first else 0.0,
                              limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED,
@@ -175,10 +188,39 @@ class HybridAStarRuns:
     def _narrow_run(self, number: int) -> HybridAStar:
         """Return the run of this number for narrow places."""
         arc, (least, most), headings, retry_penalty, visit_penalty = NARROW_RUNS[number % len(NARROW_RUNS)]
-        factors = np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS))
         expansions = min(NARROW_EXPANSIONS * NARROW_GROWTH ** (number // len(NARROW_RUNS)), MOST_NARROW_EXPANSIONS)
-        return self._new_run(arc, headings, FIRST_WEIGHT, visit_penalty, limit=UNLIMITED, max_expanded=expansions,
-                             arc_factors=factors, retry_penalty=retry_penalty, good_enough=GOOD_ENOUGH)
+        return self._run_in_narrow_places(self._checker, arc, headings, (least, most), retry_penalty, visit_penalty, expansions)
+
+    def _relaxed_run(self, arc: float, factors: tuple[float, float], headings: int, retry_penalty: float, visit_penalty: float,
+                     relaxation: float) -> HybridAStar:
+        """Return a run for a disc that needs less clearance."""
+        vehicle = self._problem.vehicle
+        self._lacking = min(relaxation * vehicle.turning_radius, MOST_RELAXATION * vehicle.robot_radius)
+        checker = CollisionChecker(clearance=self._field.kernel, required_clearance=vehicle.required_clearance - self._lacking)
+        return self._run_in_narrow_places(checker, arc, headings, factors, retry_penalty, visit_penalty, RELAXED_EXPANSIONS)
+
+    def _run_in_narrow_places(self, checker: CollisionChecker, arc: float, headings: int, factors: tuple[float, float],
+                              retry_penalty: float, visit_penalty: float, expansions: int) -> HybridAStar:
+        """Return a run with arcs of random lengths, which are what they cost: there is no room to be preferred."""
+        least, most = factors
+        length = Objective(self._problem.vehicle, self._field).edge_cost()
+        return new_search(
+            self._problem, checker, length, arc, headings, FIRST_WEIGHT, visit_penalty, start=self._problem.start,
+            goals=self.goals, to_goal=self._length_to_goal.kernel, limit=UNLIMITED, max_expanded=expansions,
+            retry_penalty=retry_penalty, good_enough=GOOD_ENOUGH,
+            arc_factors=np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS)))
+
+    @cached_property
+    def _length_to_goal(self) -> CostToGo:
+        return self._to_goal if self._objective.is_length else CostToGo.to_goal(self._problem, self._field)
+
+    def _repaired(self, path: Path, work: Work) -> Path | None:
+        """Return the path of a relaxed run with the clearance that it lacks, where it can be given that."""
+        required = self._problem.vehicle.required_clearance + CLEARANCE_MARGIN + REPAIR_MARGIN
+        return repaired(path, self._field.kernel, required, self._lacking, self._is_free, work)
+
+    def _is_free(self, path: Path) -> bool:
+        return all(self._checker.is_motion_free(curve.start, curve.radius, curve.index, curve.lengths) for curve in path.curves)
 
     def _new_run(self, arc: float, headings: int, weight: float, visit_penalty: float, **options: Any) -> HybridAStar:
         return new_search(self._problem, self._checker, self._edge_cost, arc, headings, weight, visit_penalty,

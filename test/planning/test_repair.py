@@ -1,0 +1,98 @@
+"""Chains of arcs that lack clearance, or miss the goal, are given the lengths that they should have."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from support.cases import needs_compiled, path_over
+
+from dubins_rrt_ros.evaluation.families.problems import constructed
+from dubins_rrt_ros.planning import ClearanceField, Path, PolygonMap, Problem, Settings, Vehicle, audit_path, plan
+from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
+from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.search.repair import repaired
+from dubins_rrt_ros.planning.work import Work
+
+VEHICLE = Vehicle(turning_radius=1.0, robot_radius=0.2)
+#: Room beside the path along the middle of the tunnel [m].
+SPARE = 0.01
+POSES = [(0.0, 0.0, 0.0), (2.0, 1.5, 2.0), (0.0, 3.5, 1.0), (3.0, 5.0, -0.5)]
+
+
+@pytest.fixture(scope="module")
+def middle():
+    return path_over(POSES, VEHICLE.turning_radius)
+
+
+@pytest.fixture(scope="module")
+def tunnel(middle):
+    """A map that leaves the vehicle a tunnel along the path, which is longer than that at both ends."""
+    return PolygonMap(shapely.LineString(middle.poses(0.002)[:, :2]).buffer(VEHICLE.robot_radius + SPARE, quad_segs=64))
+
+
+def spoilt(path, seed, share=0.03):
+    """The same chain with other lengths of its arcs, so that it neither fits the tunnel nor ends at the goal."""
+    factors = 1 + np.random.default_rng(seed).uniform(-share, share, path.lengths.shape)
+    return Path(path.waypoints, path.words, path.lengths * factors, path.radius)
+
+
+def repair(path, world_map, work=None, is_free=None, vehicle=VEHICLE):
+    field = ClearanceField(world_map)
+    checker = field.collision_checker(vehicle)
+
+    def motions_are_free(fitted):
+        return all(checker.is_motion_free(curve.start, curve.radius, curve.index, curve.lengths) for curve in fitted.curves)
+
+    return repaired(path, field.kernel, vehicle.required_clearance + 1.4 * CLEARANCE_MARGIN, 0.05, is_free or motions_are_free,
+                    work or Work())
+
+
+@needs_compiled
+@pytest.mark.parametrize("seed", range(5))
+def test_a_path_with_other_lengths_is_led_through_the_tunnel(middle, tunnel, seed):
+    path = repair(spoilt(middle, seed), tunnel)
+    path.check()
+    assert (path.start, path.end) == (middle.start, middle.end)
+    assert audit_path(path, Problem(tunnel, VEHICLE, middle.start, middle.end)).ok
+    assert path.length == pytest.approx(middle.length, rel=0.02)
+
+
+@needs_compiled
+def test_the_same_path_needs_no_iteration_to_speak_of(middle, tunnel):
+    work = Work()
+    assert repair(middle, tunnel, work).length == pytest.approx(middle.length, rel=1e-6)
+    assert work.done < 10
+
+
+@needs_compiled
+def test_where_the_vehicle_does_not_fit_there_is_none(middle, tunnel):
+    wider = Vehicle(turning_radius=1.0, robot_radius=VEHICLE.robot_radius + 2 * SPARE)
+    assert repair(spoilt(middle, 1), tunnel, vehicle=wider) is None
+
+
+@needs_compiled
+def test_a_path_that_is_not_free_between_the_samples_is_none(middle, tunnel):
+    asked = []
+    assert repair(middle, tunnel, is_free=asked.append) is None
+    assert 1 <= len(asked) <= 2
+
+
+def test_it_ends_with_its_work(middle, tunnel):
+    for limit in (0, 3):
+        work = Work(limit=limit)
+        assert repair(spoilt(middle, 1), tunnel, work) is None
+        assert work.done == limit
+
+
+@needs_compiled
+@pytest.mark.parametrize("number", [18, 24])
+def test_a_tube_that_leaves_millimetres_is_soon_driven_through(number):
+    """In units of work, as no clock is asked: without the repair these two take millions."""
+    case = constructed("tube", 0, number)
+    answer = plan(case.problem, Settings(planner="rrt", seed=0, planning_time=600.0, preferred_clearance=0.0))
+    assert answer.found_by == "hybrid_astar" and answer.samples < 1000
+    assert answer.work.search < 30_000
+    assert answer.length < 1.01 * case.length
+    again = plan(*read_request(to_document(answer, "tube"), case.problem.map))
+    assert again.path == answer.path and math.isclose(again.length, answer.length)
