@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,20 +34,46 @@ FIRST_WEIGHT, FIRST_VISIT_PENALTY = 2.0, 0.5
 #: Cost of a free curve to the goal, relative to the cost-to-go, up to which its path ends a run that weighs the
 #: cost-to-go by more than 1.
 GOOD_ENOUGH = 1.5
-#: Runs for narrow places, which follow by turns as long as there is no path: in a tunnel that leaves millimetres turns must begin
-#: just where they have to, so arcs have random lengths, and a pose is expanded again and again. Length of the arcs in turning
-#: radii, range of its random factor, number of headings, and penalties in arcs: of a pose for each time that it was expanded, and
-#: of visits of the same place.
-NARROW_RUNS = ((0.05, (0.2, 20.0), 128, 3.0, 0.5), (0.05, (0.2, 20.0), 128, 3.0, 0.0), (0.05, (0.2, 20.0), 64, 3.0, 2.0),
-               (0.1, (0.1, 10.0), 64, 1.5, 0.5), (0.02, (0.2, 50.0), 320, 3.0, 0.5))
-#: Number of poses that the first of these runs expand, the factor by which it grows each time round, and its maximum.
-NARROW_EXPANSIONS, NARROW_GROWTH, MOST_NARROW_EXPANSIONS = 8192, 3, 262_144
+
+
+class NarrowRun(NamedTuple):
+    """A run for narrow places: a tunnel that leaves millimetres, in which turns must begin just where they have to.
+
+    So arcs have random lengths, and a pose is expanded again and again; or the path of a disc that needs less clearance is
+    repaired.
+
+    Attributes:
+        arc: length of its arcs in turning radii.
+        factors: range of their random factor.
+        headings: number of headings of its closed set.
+        retry_penalty: penalty of a pose for each time that it was expanded, in arcs.
+        visit_penalty: penalty of visits of the same place, in arcs.
+        relaxation: clearance that a disc needs less, in turning radii.
+    """
+
+    arc: float
+    factors: tuple[float, float]
+    headings: int
+    retry_penalty: float
+    visit_penalty: float
+    relaxation: float = 0.0
+
+
+#: Runs that follow by turns as long as there is no path; those that are relaxed are for discs alone.
+NARROW_RUNS = (
+    *(NarrowRun(0.05, (0.2, 20.0), 128, 3.0, 0.5, relaxation) for relaxation in (0.05, 0.1, 0.025)),
+    *(NarrowRun(0.1, (0.1, 10.0), 64, 1.5, 0.5, relaxation) for relaxation in (0.05, 0.1, 0.025)),
+    *(NarrowRun(0.05, (0.2, 20.0), 64, 3.0, 2.0, relaxation) for relaxation in (0.05, 0.1, 0.025)),
+    NarrowRun(0.05, (0.2, 20.0), 128, 3.0, 0.5), NarrowRun(0.05, (0.2, 20.0), 128, 3.0, 0.0),
+    NarrowRun(0.05, (0.2, 20.0), 64, 3.0, 2.0), NarrowRun(0.1, (0.1, 10.0), 64, 1.5, 0.5),
+    NarrowRun(0.02, (0.2, 50.0), 320, 3.0, 0.5))
+#: Number of poses that the first of these runs expand, and that those that are relaxed do; the factor by which it grows each time
+#: round, and its maximum.
+NARROW_EXPANSIONS, RELAXED_EXPANSIONS, NARROW_GROWTH, MOST_NARROW_EXPANSIONS = 8192, 4096, 3, 262_144
+#: Maximum of the clearance that a disc needs less, as a share of its radius.
+MOST_RELAXATION = 0.5
 #: Number of random factors of the arcs of such a run; they are used in turn.
 FACTORS = 8192
-#: Runs for a disc that needs less clearance, whose paths are repaired, before those for narrow places: three kinds of these, each
-#: with the shares of the turning radius that it needs less; maximum of that as a share of its radius; poses that each expands.
-RELAXATIONS, MOST_RELAXATION, RELAXED_EXPANSIONS = (0.05, 0.1, 0.025), 0.5, 4096
-RELAXED_RUNS = tuple((*run, relaxation) for run in (NARROW_RUNS[0], NARROW_RUNS[3], NARROW_RUNS[2]) for relaxation in RELAXATIONS)
 #: Clearance beyond what the checker of the motions demands that a path is repaired to: it is measured at samples [m].
 REPAIR_MARGIN = 0.4 * CLEARANCE_MARGIN
 #: Next runs, which come closer and closer to the shortest path: length of arcs, number of headings, weight of the cost-to-go.
@@ -177,38 +203,29 @@ class HybridAStarRuns:
     def _next_run(self, best_cost: float) -> HybridAStar:
         is_first, self._lacking = best_cost == math.inf, 0.0
         if is_first and self._in_vain >= len(FIRST_RUNS):
-            relaxed = () if self._problem.vehicle.footprint else RELAXED_RUNS
-            number = self._in_vain - len(FIRST_RUNS)
-            return self._relaxed_run(*relaxed[number]) if number < len(relaxed) else self._narrow_run(number - len(relaxed))
+            return self._narrow_run(self._in_vain - len(FIRST_RUNS))
         arc, headings, weight = self._measures(is_first)
         return self._new_run(arc, headings, weight, FIRST_VISIT_PENALTY if is_first else 0.0,
                              limit=UNLIMITED if is_first else SLACK * best_cost, max_expanded=MOST_EXPANDED,
                              good_enough=GOOD_ENOUGH if weight > 1 else 0.0)
 
     def _narrow_run(self, number: int) -> HybridAStar:
-        """Return the run of this number for narrow places."""
-        arc, (least, most), headings, retry_penalty, visit_penalty = NARROW_RUNS[number % len(NARROW_RUNS)]
-        expansions = min(NARROW_EXPANSIONS * NARROW_GROWTH ** (number // len(NARROW_RUNS)), MOST_NARROW_EXPANSIONS)
-        return self._run_in_narrow_places(self._checker, arc, headings, (least, most), retry_penalty, visit_penalty, expansions)
-
-    def _relaxed_run(self, arc: float, factors: tuple[float, float], headings: int, retry_penalty: float, visit_penalty: float,
-                     relaxation: float) -> HybridAStar:
-        """Return a run for a disc that needs less clearance."""
+        """Return the run of this number for narrow places, whose arcs cost their length: there is no room to be preferred."""
         vehicle = self._problem.vehicle
-        self._lacking = min(relaxation * vehicle.turning_radius, MOST_RELAXATION * vehicle.robot_radius)
-        checker = CollisionChecker(clearance=self._field.kernel, required_clearance=vehicle.required_clearance - self._lacking)
-        return self._run_in_narrow_places(checker, arc, headings, factors, retry_penalty, visit_penalty, RELAXED_EXPANSIONS)
-
-    def _run_in_narrow_places(self, checker: CollisionChecker, arc: float, headings: int, factors: tuple[float, float],
-                              retry_penalty: float, visit_penalty: float, expansions: int) -> HybridAStar:
-        """Return a run with arcs of random lengths, which are what they cost: there is no room to be preferred."""
-        least, most = factors
-        length = Objective(self._problem.vehicle, self._field).edge_cost()
+        runs = [run for run in NARROW_RUNS if not (run.relaxation and vehicle.footprint)]
+        turn, index = divmod(number, len(runs))
+        run, checker, expansions = runs[index], self._checker, NARROW_EXPANSIONS
+        if run.relaxation:
+            expansions = RELAXED_EXPANSIONS
+            self._lacking = min(run.relaxation * vehicle.turning_radius, MOST_RELAXATION * vehicle.robot_radius)
+            required = vehicle.required_clearance - self._lacking
+            checker = CollisionChecker(clearance=self._field.kernel, required_clearance=required)
+        least, most = run.factors
         return new_search(
-            self._problem, checker, length, arc, headings, FIRST_WEIGHT, visit_penalty, start=self._problem.start,
-            goals=self.goals, to_goal=self._length_to_goal.kernel, limit=UNLIMITED, max_expanded=expansions,
-            retry_penalty=retry_penalty, good_enough=GOOD_ENOUGH,
-            arc_factors=np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS)))
+            self._problem, checker, Objective(vehicle, self._field).edge_cost(), run.arc, run.headings, FIRST_WEIGHT,
+            run.visit_penalty, start=self._problem.start, goals=self.goals, to_goal=self._length_to_goal.kernel, limit=UNLIMITED,
+            max_expanded=min(expansions * NARROW_GROWTH**turn, MOST_NARROW_EXPANSIONS), retry_penalty=run.retry_penalty,
+            good_enough=GOOD_ENOUGH, arc_factors=np.exp(self._narrow_rng.uniform(math.log(least), math.log(most), FACTORS)))
 
     @cached_property
     def _length_to_goal(self) -> CostToGo:
