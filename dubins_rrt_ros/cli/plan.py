@@ -62,7 +62,7 @@ def add_arguments(parser: Parser) -> None:
     add_json_flag(parser, "the plan, also without a path,")
     parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x, y, theta, clearance, curvature")
     parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
-                                                         f"search ({', '.join(ANIMATIONS)})")
+                                                         f"search, over waypoints of the drive ({', '.join(ANIMATIONS)})")
     parser.add_argument("--certificate", metavar="FILE",
                         help="write the path with a proof of how short it is, as `dubins_rrt certify` does")
     add_certificate_flags(parser)
@@ -193,6 +193,11 @@ def _draw(file: str, answer: Plan) -> None:
         from dubins_rrt_ros.planning.pictures.drawing import draw_plan  # here, since matplotlib takes longer than most plans
         draw_plan(file, answer)
         return
+    from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, save_drive
+    if answer.path and answer.waypoints:  # whose search is one of many legs in many headings
+        with progress_bar(MOST_FRAMES, " frames") as move:
+            save_drive(file, answer, lambda done: move(done, ""))
+        return
     recording = _recorded(answer)
     with progress_bar(recording.frames, " frames") as move:
         recording.save(file, answer, lambda done: move(done, ""))
@@ -203,7 +208,7 @@ def _recorded(answer: Plan) -> "Recording":
     from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
     samples = max(1, answer.samples // MOST_FRAMES)
     recording = Recording(samples)
-    if answer.work:  # over waypoints there is none, and nothing but the answer is shown
+    if answer.work:
         with _shown(answer.settings) as show:
             def follow(progress: Progress) -> None:
                 show(progress)

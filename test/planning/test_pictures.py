@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 from support.cases import empty_map
 
-from dubins_rrt_ros.planning import PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
+from dubins_rrt_ros.planning import GridMap, PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
-from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording
+from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording, save_drive
 
 EVERY, SAMPLES = 7, 60
 
@@ -161,3 +161,25 @@ def test_a_tour_shows_its_waypoints_and_counts_them():
     result.plot(axes)
     assert " m over 3 waypoints, " in axes.get_title()
     assert {"1, 3", "2"} <= {text.get_text() for text in axes.texts}
+
+
+def test_a_tour_is_animated_as_a_drive(tmp_path, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.pictures.animation.MOST_FRAMES", 12)
+    result, drawn = plan_through(problem_here(), [(-3.0, 2.0)], Settings(samples=20, planning_time=60.0, seed=1)), []
+    save_drive(str(tmp_path / "drive.gif"), result, drawn.append)
+    assert drawn == list(range(1, 13))
+    assert Image.open(tmp_path / "drive.gif").n_frames == 12  # none is as the one before
+
+
+@pytest.mark.parametrize("heading", np.linspace(-3, 3, 7).tolist())
+def test_names_are_written_on_free_space_and_within_the_picture(heading):
+    grid = np.zeros((100, 100))
+    grid[60:64] = 100  # a wall above the goal
+    problem = Problem(GridMap(grid, 0.2), Vehicle(), (2.0, 2.0, 0.0), (10.0, 11.0, heading))
+    axes = matplotlib.figure.Figure().add_subplot()
+    plan(problem, Settings(planner="rrt", planning_time=60.0, seed=1)).plot(axes)
+    axes.get_figure().canvas.draw()
+    for name in (text for text in axes.texts if text.get_text() in ("start", "goal")):
+        box = name.get_window_extent().transformed(axes.transData.inverted())
+        assert not (box.y0 < 12.8 and box.y1 > 12.0), name
+        assert 0 <= box.x0 < box.x1 <= 20 and 0 <= box.y0 < box.y1 <= 20

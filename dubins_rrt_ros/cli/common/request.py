@@ -14,7 +14,7 @@ from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
 from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
 from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
-from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS
+from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS, OTHER_ENDINGS
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, read_waypoints
 from dubins_rrt_ros.planning.problem import Waypoint
 from dubins_rrt_ros.planning.text import one_line
@@ -72,11 +72,13 @@ def find_map_or_suggest(name: str) -> Path:
     """Find the file of a map.
 
     Raises:
-        MapNotFound: there is none; the message suggests an installed map with a similar name.
+        MapNotFound: there is none; the message suggests an installed map with a similar name, unless a picture was named.
     """
     try:
         return find_map(name)
     except MapNotFound as error:
+        if Path(name).suffix.lower() not in ("", *MAP_ENDINGS, *OTHER_ENDINGS):
+            raise
         files = sorted(installed_maps(), key=lambda file: file.suffix == OMITTED_ENDING)  # the last of a stem counts
         own = {file.stem: file.stem if file.suffix == OMITTED_ENDING else file.name for file in files}
         raise MapNotFound(f"{error}{near_miss(Path(name).stem, own.values())}") from None

@@ -29,6 +29,7 @@ from dubins_rrt_ros.planning.pictures.drawing import (
     draw_on,
     draw_poses,
     frame,
+    of_plan,
     planner_title,
 )
 from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
@@ -129,7 +130,7 @@ def bounds() -> Figure:
     region.set(**EDGED)
     poses = path_of(final).poses(SPACING)
     axes.plot(poses[:, 0], poses[:, 1], color=FAILURE, zorder=4, **EDGED)
-    draw_poses(axes, problem.start, problem.goal, problem.vehicle)
+    draw_poses(axes, of_plan(final))
     figure.legend(handles=[Line2D([], [], color=FAILURE, label="best path", **EDGED),
                            Line2D([], [], color="white", label="a shorter one leads within", **EDGED)],
                   loc="outside lower center", ncols=2, fontsize=NOTE, frameon=False)
@@ -153,7 +154,7 @@ def proof() -> Figure:
     axes.plot(poses[:, 0], poses[:, 1], color=PATH, linewidth=2.4, zorder=4)
     last = [np.flatnonzero(costs <= level)[-1] for level in levels]
     axes.plot(poses[last, 0], poses[last, 1], "o", color=FAILURE, markersize=7, zorder=5)
-    draw_poses(axes, problem.start, problem.goal, problem.vehicle)
+    draw_poses(axes, of_plan(final))
     figure.legend(handles=[
         Line2D([], [], color=GOAL, linewidth=1.6, label="levels"), Line2D([], [], color=PATH, linewidth=2.4, label="path"),
         Line2D([], [], color=FAILURE, marker="o", linestyle="none", label="crossings"),

@@ -1,8 +1,9 @@
-"""Animations of a search: the tree grows, the path becomes shorter and the lower bound rises.
+"""Animations: of a search, in which the tree grows, the path becomes shorter and the lower bound rises; and of a drive.
 
 >>> recording = Recording()
 >>> result = plan(problem, settings, on_progress=recording, report_samples=50)
 >>> recording.save("maze.gif", result)
+>>> save_drive("drive.gif", result)
 """
 
 import base64
@@ -17,12 +18,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
+from ..maps.model import Map
 from . import ANIMATIONS, VIDEO, check_ffmpeg
 from .drawing import (
     BOTTOM,
@@ -34,7 +36,7 @@ from .drawing import (
     draw_path,
     draw_poses,
     draw_tree,
-    draw_waypoints,
+    draw_vehicle,
     frame,
     of_plan,
     view,
@@ -104,57 +106,63 @@ class Recording:
         Raises:
             PictureError: the ending is .mp4, and ffmpeg is not installed.
         """
-        ending = Path(file).suffix.lower()
-        if ending == VIDEO:
-            check_ffmpeg()
         chosen = np.unique(np.linspace(0, len(self._frames), self.frames).round().astype(int))
         self._add(plan)
-        pictures = []
-        for picture in _Screen(self._frames).pictures([self._frames[i] for i in chosen]):
-            pictures.append(picture)
-            if on_frame:
-                on_frame(len(pictures))
-        WRITERS[ending](file, pictures)
+        _save(file, _SearchScreen(self._frames), chosen.tolist(), on_frame)
+
+
+def save_drive(file: str, plan: "Plan", on_frame: Callable[[int], None] | None = None) -> None:
+    """Write an animation of the vehicle that drives along the path of a plan, with its clearance below the map.
+
+    Args:
+        file, on_frame: as for `Recording.save`.
+        plan: an answer with a path.
+
+    Raises:
+        PictureError: the ending is .mp4, and ffmpeg is not installed.
+    """
+    screen = _DriveScreen(plan)
+    ends = np.linspace(0, screen.driven[-1], MOST_FRAMES)
+    _save(file, screen, np.unique(np.searchsorted(screen.driven, ends, "right") - 1).tolist(), on_frame)
+
+
+def _save(file: str, screen: "_Screen", frames: Sequence[int], on_frame: Callable[[int], None] | None) -> None:
+    ending = Path(file).suffix.lower()
+    if ending == VIDEO:
+        check_ffmpeg()
+    pictures = []
+    for picture in screen.pictures(frames):
+        pictures.append(picture)
+        if on_frame:
+            on_frame(len(pictures))
+    WRITERS[ending](file, pictures)
 
 
 class _Screen:
-    """A figure that shows frame after frame: the map, and below it path and bound over the samples."""
+    """A base of figures that show frame after frame: the map, and below it curves, over which the frames have their numbers."""
 
-    def __init__(self, frames: Sequence[Frame]):
-        self._frames = frames
-        drawing = frames[-1].drawing
-        low, high = view(drawing.map)
+    def __init__(self, world_map: Map):
+        low, high = view(world_map)
         width, height = MAP_SIDE * (high - low) / (high - low).max()
         below = BOTTOM + CURVES + BOTTOM
         across, up = width + LEFT + RIGHT, below + height + TITLE
         self._figure = Figure(figsize=(across, up), dpi=DPI)
         self._map = self._figure.add_axes((LEFT / across, below / up, width / across, height / up))
-        frame(self._map, drawing.map)
+        frame(self._map, world_map)
         self._map.set(xlabel="")
-        draw_map(self._map, drawing.map)
+        draw_map(self._map, world_map)
         self._curves = self._figure.add_axes((LEFT / across, BOTTOM / up, width / across, CURVES / up))
-        self._prepare_curves(self._curves)
-        self._title = self._figure.text(LEFT / across, 1 - 0.13 / up, "", fontsize=11, weight="bold", va="top")
-
-    def _prepare_curves(self, axes: Axes) -> None:
-        """Fit the axes of the curves to all frames."""
-        values = (value for one in self._frames for value in (one.length, one.lower_bound))
-        known = [value for value in values if value is not None and np.isfinite(value)]
-        margin = 0.08 * (max(known) - min(known)) or 1.0
-        axes.set(xlim=(0, max(1, self._frames[-1].samples)), ylim=(min(known) - margin, max(known) + margin), xlabel="samples",
-                 ylabel="length [m]")
-        axes.yaxis.set_major_locator(MaxNLocator(4))
-        axes.spines[["top", "right"]].set_visible(False)
-        self._lines = [axes.plot([], [], color=colour, linewidth=2, label=label, drawstyle="steps-post")[0]
-                       for colour, label in ((PATH, "path"), (BOUND, "no path is shorter"))]
-        axes.legend(loc="lower right", bbox_to_anchor=(1, 0.93), ncols=2, fontsize=8, frameon=False)
-        for one in (self._map, axes):
+        self._curves.spines[["top", "right"]].set_visible(False)
+        self._curves.yaxis.set_major_locator(MaxNLocator(4))
+        for one in (self._map, self._curves):
             one.tick_params(labelsize=8)
             one.yaxis.label.set_fontsize(9)
             one.xaxis.label.set_fontsize(9)
+        self._lines: list[Line2D] = []
+        self._title = self._figure.text(LEFT / across, 1 - 0.13 / up, "", fontsize=11, weight="bold", va="top")
 
-    def pictures(self, frames: Sequence[Frame]) -> Iterator[Image.Image]:
-        """Yield the pictures of frames, in order."""
+    def pictures(self, frames: Sequence[int]) -> Iterator[Image.Image]:
+        """Yield the pictures of the frames of these numbers, in order."""
         # What all frames share is drawn once: map, axes and labels take most of the time.
         canvas = FigureCanvasAgg(self._figure)
         canvas.draw()
@@ -169,18 +177,65 @@ class _Screen:
             for artist in changed:
                 artist.remove()
 
-    def _show(self, shown: Frame) -> None:
-        drawing = shown.drawing
-        draw_tree(self._map, drawing.tree)
-        draw_path(self._map, drawing.vehicle, drawing.path)
-        draw_poses(self._map, drawing.start, drawing.goal, drawing.vehicle)
-        draw_waypoints(self._map, drawing.waypoints)
-        past = [one for one in self._frames if one.samples <= shown.samples]
+    def _show(self, shown: int) -> None:
+        """Draw what one frame shows on the map, and set the lines and the title."""
+        raise NotImplementedError
+
+
+class _SearchScreen(_Screen):
+    """The tree and the path that a search has so far, and below them path and bound over the samples."""
+
+    def __init__(self, frames: Sequence[Frame]):
+        super().__init__(frames[-1].drawing.map)
+        self._frames = frames
+        values = (value for one in frames for value in (one.length, one.lower_bound))
+        known = [value for value in values if value is not None and np.isfinite(value)]
+        margin = 0.08 * (max(known) - min(known)) or 1.0
+        self._curves.set(xlim=(0, max(1, frames[-1].samples)), ylim=(min(known) - margin, max(known) + margin), xlabel="samples",
+                         ylabel="length [m]")
+        self._lines = [self._curves.plot([], [], color=colour, linewidth=2, label=label, drawstyle="steps-post")[0]
+                       for colour, label in ((PATH, "path"), (BOUND, "no path is shorter"))]
+        self._curves.legend(loc="lower right", bbox_to_anchor=(1, 0.93), ncols=2, fontsize=8, frameon=False)
+
+    def _show(self, shown: int) -> None:
+        now = self._frames[shown]
+        draw_tree(self._map, now.drawing.tree)
+        draw_path(self._map, now.drawing.vehicle, now.drawing.path)
+        draw_poses(self._map, self._frames[-1].drawing)  # whose path tells where their names stay
+        past = [one for one in self._frames if one.samples <= now.samples]
         samples = [one.samples for one in past]
         self._lines[0].set_data(samples, [np.nan if one.length is None else one.length for one in past])
         self._lines[1].set_data(samples, [one.lower_bound for one in past])
-        length = "no path yet" if shown.length is None else f"path {shown.length:.2f} m"
-        self._title.set_text(f"{shown.samples} samples, {length}\nno path is shorter than {shown.lower_bound:.2f} m")
+        length = "no path yet" if now.length is None else f"path {now.length:.2f} m"
+        self._title.set_text(f"{now.samples} samples, {length}\nno path is shorter than {now.lower_bound:.2f} m")
+
+
+class _DriveScreen(_Screen):
+    """The vehicle at each pose of a path, and below it the clearance over the distance driven.
+
+    Attributes:
+        driven: (n,) distance driven at each pose [m].
+    """
+
+    def __init__(self, plan: "Plan"):
+        super().__init__(plan.problem.map)
+        self._drawing, self._clearances, self._indices = of_plan(plan), plan.clearances(), plan.waypoint_indices
+        chords = np.hypot(*np.diff(self._drawing.path[:, :2], axis=0).T)
+        self.driven = np.append(0.0, np.cumsum(chords))
+        self._curves.set(xlim=(0, self.driven[-1] or 1.0), ylim=(0, 1.15 * self._clearances.max() or 1.0), xlabel="driven [m]",
+                         ylabel="clearance [m]")
+        self._lines = [self._curves.plot([], [], color=PATH, linewidth=2)[0]]
+
+    def _show(self, shown: int) -> None:
+        drawing, until = self._drawing, shown + 1
+        draw_path(self._map, drawing.vehicle, drawing.path[:until])
+        draw_poses(self._map, drawing)
+        draw_vehicle(self._map, drawing.path[shown], PATH, drawing.vehicle)
+        self._lines[0].set_data(self.driven[:until], self._clearances[:until])
+        passed = sum(index <= shown for index in self._indices)
+        waypoints = f", {passed} of {len(self._indices)} waypoints passed" if self._indices else ""
+        self._title.set_text(f"{self.driven[shown]:.2f} m of {self.driven[-1]:.2f} m driven{waypoints}\n"
+                             f"clearance {self._clearances[shown]:.2f} m")
 
 
 def _write_gif(file: str, pictures: Sequence[Image.Image]) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import LinearSegmentedColormap
@@ -18,6 +17,7 @@ from matplotlib.transforms import Affine2D
 from ..maps.model import GridMap, Map
 from ..problem import Waypoint
 from ..vehicle import Vehicle
+from .names import Names
 from .outlines import body, contour, swept
 
 if TYPE_CHECKING:
@@ -133,8 +133,7 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     draw_map(axes, drawing.map)
     draw_tree(axes, drawing.tree)
     draw_path(axes, drawing.vehicle, drawing.path, drawing.rooms)
-    draw_poses(axes, drawing.start, drawing.goal, drawing.vehicle)
-    draw_waypoints(axes, drawing.waypoints)
+    draw_poses(axes, drawing)
     if drawing.location is not None:
         axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
 
@@ -146,19 +145,20 @@ def frame(axes: Axes, world_map: Map) -> None:
     axes.ticklabel_format(useOffset=False, style="plain")
 
 
-def draw_poses(axes: Axes, start: Sequence[float], goal: Sequence[float], vehicle: Vehicle) -> None:
-    """Draw the vehicle at the start and at the goal, with arrows and names, on axes that `frame` has fitted to the map."""
-    size = vehicle.robot_radius
-    arrow = max(2.2 * vehicle.inscribed_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
-    _draw_pose(axes, start, START, vehicle, arrow)
-    _draw_pose(axes, goal, GOAL, vehicle, arrow)
-    # Behind the start and ahead of the goal, where no path runs.
-    sideways = max(1.3 * vehicle.inscribed_radius, 0.3 * arrow)
-    _draw_name(axes, "start", start, START, -max(1.1 * size, sideways), sideways)
-    _draw_name(axes, "goal", goal, GOAL, max(1.1 * arrow, 1.1 * size), max(1.1 * arrow, sideways))
+def draw_poses(axes: Axes, drawing: Drawing) -> None:
+    """Draw start and goal, each with the vehicle, an arrow and its name, and the waypoints, on axes that `frame` has fitted."""
+    arrow = max(2.2 * drawing.vehicle.inscribed_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    for pose, colour in ((drawing.start, START), (drawing.goal, GOAL)):
+        draw_vehicle(axes, pose, colour, drawing.vehicle)
+        _draw_arrow(axes, pose, colour, arrow)
+    _draw_waypoints(axes, drawing.waypoints)
+    names = Names(axes, drawing, arrow)
+    # Behind the start and ahead of the goal no path runs.
+    names.draw("start", drawing.start, START, math.pi)
+    names.draw("goal", drawing.goal, GOAL, 0.0)
 
 
-def draw_waypoints(axes: Axes, waypoints: Sequence[Waypoint]) -> None:
+def _draw_waypoints(axes: Axes, waypoints: Sequence[Waypoint]) -> None:
     """Draw a numbered disc at each waypoint, and a line along its heading; those at one place share a disc."""
     numbers: dict[tuple[float, float], list[str]] = {}
     for number, (x, y, theta) in enumerate(waypoints, 1):
@@ -248,31 +248,15 @@ def draw_path(axes: Axes, vehicle: Vehicle, path: np.ndarray, rooms: np.ndarray 
                                            linewidths=2.4, capstyle="round", zorder=4))
 
 
-def _draw_pose(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle, length: float) -> None:
-    """Draw the vehicle and an arrow along its heading."""
-    x, y, theta = pose
+def draw_vehicle(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicle) -> None:
+    """Draw the area that the vehicle covers at a pose."""
     area = body(vehicle, pose)
     axes.add_patch(PathPatch(area, facecolor=colour, alpha=0.3, edgecolor="none", zorder=5))
     axes.add_patch(PathPatch(area, fill=False, edgecolor=colour, linewidth=1.2, zorder=5))
+
+
+def _draw_arrow(axes: Axes, pose: Sequence[float], colour: str, length: float) -> None:
+    x, y, theta = pose
     arrow = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
     place = Affine2D().rotate(theta).translate(x, y)
     axes.add_patch(Polygon(place.transform(arrow), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))
-
-
-def _draw_name(axes: Axes, name: str, pose: Sequence[float], colour: str, ahead: float,
-               sideways: float) -> None:
-    """Write a name at a distance ahead of a pose, negative behind it; where it would leave the frame, at another sideways."""
-    x, y, theta = pose
-    dx, dy = ahead * math.cos(theta), ahead * math.sin(theta)
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    if not (left < x + 2.5 * dx < right and low < y + 2.5 * dy < high):
-        # It would run over the frame: to the side of the pose, then, that faces the middle of the map.
-        dx, dy = (sideways / abs(ahead) * length for length in (-dy, dx))
-        if dx * (left + right - 2 * x) + dy * (low + high - 2 * y) < 0:
-            dx, dy = -dx, -dy
-    away = math.hypot(dx, dy)
-    horizontal = {-1: "right", 0: "center", 1: "left"}[round(dx / away)]
-    vertical = {-1: "top", 0: "center", 1: "bottom"}[round(dy / away)]
-    halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
-    axes.text(x + dx, y + dy, name, color=colour, fontsize=10, weight="bold", ha=horizontal, va=vertical, path_effects=halo,
-              zorder=7)
