@@ -278,5 +278,5 @@ def expand(search: HybridAStar, pace: Pace, expansions: int, work: Work) -> None
         size, before = min(work.portion(pace.size), expansions), search.expanded
         with pace.measured(size):
             search.run(size)
-        work.done += search.expanded - before + search.ended
+        work.done += int(search.expanded - before + search.ended)  # interpreted, it is one of NumPy's
         expansions -= size
