@@ -11,6 +11,7 @@ from dubins_rrt_ros.evaluation.families.problems import constructed
 from dubins_rrt_ros.planning import ClearanceField, Path, PolygonMap, Problem, Settings, Vehicle, audit_path, plan
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.search import repair as repair_module
 from dubins_rrt_ros.planning.search.repair import repaired
 from dubins_rrt_ros.planning.work import Work
 
@@ -76,6 +77,26 @@ def test_a_path_that_is_not_free_between_the_samples_is_none(middle, tunnel):
     asked = []
     assert repair(middle, tunnel, is_free=asked.append) is None
     assert 1 <= len(asked) <= 2
+
+
+@needs_compiled
+@pytest.mark.parametrize("seed", range(4))
+def test_a_chain_that_is_far_from_any_path_costs_little(middle, tunnel, seed, monkeypatch):
+    """A step of the fit can lead anywhere; a chain of kilometres would have millions of samples."""
+    lengths, ends = [], repair_module._Fit._ends
+    monkeypatch.setattr(repair_module._Fit, "_ends", lambda fit, tried: lengths.append(float(tried.sum())) or ends(fit, tried))
+    monkeypatch.setattr(repair_module, "HOPELESS", math.inf)
+    path = spoilt(middle, seed, share=0.9)
+    repair(path, tunnel)
+    assert max(lengths) <= repair_module.MOST_LONGER * path.length
+
+
+def test_where_no_step_is_to_be_had_there_is_no_path(middle, tunnel, monkeypatch):
+    def singular(*_):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(np.linalg, "solve", singular)
+    assert repair(spoilt(middle, 1), tunnel) is None
 
 
 def test_it_ends_with_its_work(middle, tunnel):

@@ -33,6 +33,8 @@ PRECISION, COARSE_PRECISION = 1e-9, 1e-4
 DIFFERENCE = 1e-7
 #: Damping of the first iteration, its minimum, and its maximum, where a round ends; and the factors by which it rises and falls.
 DAMPING, LEAST_DAMPING, MOST_DAMPING, RISE, FALL = 1e-4, 1e-9, 1e6, 4.0, 5.0
+#: Maximum length of a chain that is tried, relative to the length at first: a step can lead anywhere.
+MOST_LONGER = 2.0
 #: Length of an arc that is left out [turning radii].
 NEGLIGIBLE = 1e-9
 _TURNS = np.array([[SIDES[letter] for letter in word] for word in WORDS], float)
@@ -106,6 +108,7 @@ class _Fit:
         self._turns = turns[first]
         self._lengths = np.add.reduceat(lengths, first) if len(first) else lengths
         self._radius, self._start, self._goal = path.radius, path.start, path.end
+        self._longest = MOST_LONGER * float(self._lengths.sum())
         self._clearance, self._work = clearance, work
         self._required = self._spacing = 0.0
         self.is_done = False
@@ -130,8 +133,8 @@ class _Fit:
             gradient, curvature = jacobian.T @ now.values, jacobian.T @ jacobian
             while True:
                 lengths = self._stepped(gradient, curvature, damping)
-                next_one = self._residuals(lengths)
-                if next_one.cost < now.cost:
+                next_one = self._residuals(lengths) if lengths.sum() <= self._longest else None  # NaN is not
+                if next_one and next_one.cost < now.cost:
                     break
                 damping *= RISE
                 if damping > MOST_DAMPING:
@@ -152,12 +155,15 @@ class _Fit:
         return Path(waypoints, words, lengths, self._radius)
 
     def _stepped(self, gradient: np.ndarray, curvature: np.ndarray, damping: float) -> np.ndarray:
-        """Return the lengths after a damped step of Gauss and Newton; those that are 0 and would fall stay as they are."""
+        """Return the lengths after a damped step of Gauss and Newton, NaN where there is none; those that are 0 do not fall."""
         scale = np.diag(curvature) + LEAST_DAMPING * np.trace(curvature)
         free = ~((self._lengths <= 0) & (gradient > 0))
         step = np.zeros(len(self._lengths))
         system = curvature[np.ix_(free, free)] + damping * np.diag(scale[free])
-        step[free] = -np.linalg.solve(system, gradient[free])
+        try:
+            step[free] = -np.linalg.solve(system, gradient[free])
+        except np.linalg.LinAlgError:  # singular in spite of the damping
+            step[:] = math.nan
         return np.maximum(0.0, self._lengths + step)
 
     def _ends(self, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
