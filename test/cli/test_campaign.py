@@ -68,7 +68,9 @@ def test_any_number_of_processes_judges_the_same(tmp_path, capsys):
         file = tmp_path / f"{jobs}.jsonl"
         assert run("--problems", "6", "--first", "50", "--jobs", jobs, "--out", str(file), capsys=capsys)[0] == 0
         found = sorted((json.loads(line) for line in file.read_text().splitlines()), key=lambda line: line["number"])
-        return [(line["number"], line["kind"], line["status"], line["edges"], line["length"]) for line in found]
+        # How many edges there are when the time is up depends on the machine.
+        return [(line["number"], line["kind"], line["status"], line["edges"] * (line["status"] != "TIMEOUT"), line["length"])
+                for line in found]
 
     assert lines("1") == lines("3")
 
