@@ -9,6 +9,7 @@ from support.cases import SCALE, empty_map, needs_compiled
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
 from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, plan, prepare
+from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.planning.search.smoothing import smooth
 from dubins_rrt_ros.planning.work import Work
 
@@ -47,7 +48,7 @@ def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
 
 
 def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
-    """By a search with the samples that it took the same path is had again."""
+    """By a search with the work that it took the same path is had again."""
     problem, told = Problem(walled_with_a_gap(), VEHICLE, START, GOAL), []
     with monkeypatch.context() as patched:
         now = iter(np.arange(1e6) / 10_000)
@@ -57,8 +58,8 @@ def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
     assert result.status == Status.NONE
     assert 0 < result.samples < 1_000_000
     assert told[-1] == pytest.approx(result.length, abs=1e-6)
-    again = plan(problem, settings("rrt_star", samples=result.samples))
-    assert again.path == result.path
+    again = plan(*read_request(to_document(result, "gap"), problem.map))
+    assert (again.path, again.samples) == (result.path, result.samples)
 
 
 def test_a_path_is_found_before_it_is_smoothed_and_ready_afterwards(planner, monkeypatch):

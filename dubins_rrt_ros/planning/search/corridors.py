@@ -17,10 +17,10 @@ from .._kernels import COMPILED
 from ..curves.path import Path
 from ..problem import Problem
 from ..work import Work
+from .arc_search import FIRST_SLICE, LARGEST_SLICE, expand, new_search
 from .cost import Objective
 from .cost_to_go import CostToGo
 from .detours import ClosedPlaces, Detour, Detours, Landscape, SaddleDetours, Searches
-from .hybrid_astar import FIRST_SLICE, LARGEST_SLICE, expand, new_search
 from .pace import Pace
 from .smoothing import smooth
 
