@@ -54,6 +54,7 @@ NARROW_RUNS = (
     NarrowRun(0.1, 64, 0.1, MEDIUM, 1.5), NarrowRun(0.1, 64, 0.2, MEDIUM, 100.0), NarrowRun(0.05, 64, 0.1, SHORT, 3.0, 2.0),
     NarrowRun(0.05, 128, 0.025, SHORT, 100.0), NarrowRun(0.1, 64, 0.05, MEDIUM, 1.5), NarrowRun(0.05, 128, 0.1, SHORT, 3.0),
     NarrowRun(0.1, 64, 0.05, MEDIUM, 100.0), NarrowRun(0.05, 64, 0.2, SHORT, 3.0, 2.0),
+    NarrowRun(0.1, 64), NarrowRun(0.05, 128), NarrowRun(0.1, 64, 0.0, MEDIUM, 20.0), NarrowRun(0.05, 128, 0.0, SHORT, 100.0),
     NarrowRun(0.05, 128, 0.0, SHORT, 3.0), NarrowRun(0.05, 128, 0.0, SHORT, 3.0, 0.0), NarrowRun(0.05, 64, 0.0, SHORT, 3.0, 2.0),
     NarrowRun(0.1, 64, 0.0, MEDIUM, 1.5), NarrowRun(0.02, 320, 0.0, (0.2, 50.0), 3.0))
 #: Factor of the cost-to-go.
