@@ -93,7 +93,7 @@ def _add_tolerances(group: argparse._ArgumentGroup) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Judge the path, report, and return the exit status."""
-    check_folder(arguments.json)
+    check_folder(arguments.json, sources=[arguments.path])
     for name in ("tolerance_xy", "tolerance_yaw"):
         if not 0 <= getattr(arguments, name) < math.inf:
             raise UsageError(f"--{name.replace('_', '-')} is {getattr(arguments, name):g}; give 0 or more")

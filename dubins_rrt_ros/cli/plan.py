@@ -95,7 +95,8 @@ def add_request_arguments(parser: Parser, certified: bool = False) -> list[argpa
 
 def run(arguments: argparse.Namespace) -> int:
     """Plan, report, write the files, and return the exit status."""
-    check_folder(arguments.json, arguments.csv, arguments.plot, arguments.certificate)
+    sources = [file for file in (getattr(arguments, "map", None), arguments.replay) if file]
+    check_folder(arguments.json, arguments.csv, arguments.plot, arguments.certificate, sources=sources)
     check_drawing(arguments.plot, DRAWINGS + ANIMATIONS)
     request = _request(arguments)
     if arguments.certificate and request.waypoints:

@@ -129,3 +129,23 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(words, capsys)
     before = sorted(Path().iterdir())
     assert main([*words, "--json", "nowhere/x.json"]) == 2
     assert "there is no folder nowhere" in capsys.readouterr().err and sorted(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize("words, says", [
+    (["--json", "out", "--csv", "out"], "out is to be written twice"),
+    (["--json", "x.json", "--csv", "./x.json"], "x.json is to be written twice"),
+    (["--csv", "hall.wkt"], "hall.wkt is read, and would be written over")])
+def test_nothing_is_written_over_what_is_read_or_written(words, says, capsys):
+    before = Path("hall.wkt").read_bytes()
+    assert main(["plan", "hall.wkt", "--start", "0", "0", "0", "--goal", "1", "0", "0", *words]) == 2
+    assert says in capsys.readouterr().err and Path("hall.wkt").read_bytes() == before
+
+
+def test_a_key_that_an_object_has_twice_is_refused(capsys):
+    """Of which the last value was taken."""
+    problem = '{"name": "a", "map": "hall.wkt", "start": [0, 0, 0], "goal": [1, 0, 0], "start": [5, 0, 0]}'
+    Path("problems.json").write_text(f"[{problem}]")
+    Path("path.json").write_text('{"poses": [[0, 0, 0]], "poses": [[1, 0, 0], [2, 0, 0]]}')
+    for words in (["bench", "problems.json", "--out", "x.jsonl"], ["audit", "path.json", "hall.wkt"]):
+        assert main(words) == 2
+        assert f'{words[1]}: an object has "{"start" if words[0] == "bench" else "poses"}" 2 times' in capsys.readouterr().err

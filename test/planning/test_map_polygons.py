@@ -191,3 +191,15 @@ def test_polygons_of_too_many_vertices_are_refused_before_they_are_checked():
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     with pytest.raises(MapError, match="vertices; simplify the polygons to 500000"):
         PolygonMap(shapely.Polygon(ring))
+
+
+@pytest.mark.parametrize("old, new, key", [
+    ('"coordinates": [[[4', '"coordinates": [[[1, 1], [2, 1], [2, 2], [1, 1]]], "coordinates": [[[4', "coordinates"),
+    ('"role": "bounds"', '"role": "obstacle", "role": "bounds"', "role"),
+    ('"features"', '"features": [], "features"', "features")],
+    ids=["coordinates", "role", "features"])
+def test_a_key_that_an_object_has_twice_is_refused(old, new, key):
+    text = collection(BOUNDS, feature([POST]))
+    assert text.count(old) == 1
+    with pytest.raises(MapError, match=f'an object has "{key}" 2 times; give it once'):
+        parse_geojson(text.replace(old, new), "yard.geojson")

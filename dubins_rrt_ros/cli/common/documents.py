@@ -1,12 +1,12 @@
 """Files that commands read: text and JSON, refused in one line where they are none."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from dubins_rrt_ros.planning.maps.json import RepeatedKey, load_unique
 from dubins_rrt_ros.planning.maps.yaml import load_plain
 
 from .parser import UsageError
@@ -19,10 +19,12 @@ def read_json(file: str) -> Any:
     """Read a JSON file.
 
     Raises:
-        UsageError: it cannot be read, or is no JSON.
+        UsageError: it cannot be read, is no JSON, or has an object with a key twice.
     """
     try:
-        return json.loads(read_text(file))
+        return load_unique(read_text(file))
+    except RepeatedKey as error:
+        raise UsageError(f"{file}: {error}") from error
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{file} is no JSON file: {error}") from error
 
@@ -31,11 +33,13 @@ def read_poses_or_json(file: str) -> Any:
     """Read a JSON file; or [[x, y, yaw], ...] from the CSV of `plan --csv`, or from the YAML in which a nav_msgs/Path is echoed.
 
     Raises:
-        UsageError: it cannot be read, or is none of these.
+        UsageError: it cannot be read, is none of these, or has an object with a key twice.
     """
     text = read_text(file)
     try:
-        return json.loads(text)
+        return load_unique(text)
+    except RepeatedKey as error:
+        raise UsageError(f"{file}: {error}") from error
     except (ValueError, RecursionError) as error:
         poses = _csv_poses(text) or _echoed_poses(text)
         if not poses:

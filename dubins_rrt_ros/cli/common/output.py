@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -22,17 +23,30 @@ CSV_COLUMNS = ("x", "y", "theta", "clearance", "curvature")
 DRAWINGS = (".png", ".svg", ".pdf")
 
 
-def check_folder(*files: str | None) -> None:
-    """Refuse a file in a folder that does not exist. Called before planning, so that no plan is lost.
+def check_folder(*files: str | None, sources: Iterable[str] = ()) -> None:
+    """Refuse a file that cannot be written, or would take the place of another. Called before the work, so that none is lost.
+
+    Args:
+        files: to be written.
+        sources: to be read.
 
     Raises:
-        UsageError: one of the files has no folder, or is one.
+        UsageError: one of the files has no folder, is one, is named twice, or is a source.
     """
+    read, written = {Path(source).resolve() for source in sources}, set()
     for file in files:
-        if file and file != STDOUT and not Path(file).parent.is_dir():
-            raise UsageError(f"there is no folder {Path(file).parent} to write {Path(file).name} to; make it first")
-        if file and Path(file).is_dir():
+        if not file or file == STDOUT:
+            continue
+        path = Path(file).resolve()
+        if not path.parent.is_dir():
+            raise UsageError(f"there is no folder {Path(file).parent} to write {path.name} to; make it first")
+        if path.is_dir():
             raise UsageError(f"{file} is a folder; name a file to write to")
+        if path in written and (path.is_file() or not path.exists()):  # a device takes both
+            raise UsageError(f"{file} is to be written twice, so that the first would be lost; name another file")
+        if path in read:
+            raise UsageError(f"{file} is read, and would be written over; name another file")
+        written.add(path)
 
 
 def check_drawing(file: str | None, endings: tuple[str, ...] = DRAWINGS) -> None:

@@ -1,6 +1,5 @@
 """Free space as polygons from the text of a GeoJSON or WKT file."""
 
-import json
 import math
 import re
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ import shapely
 from ..text import quoted
 from .errors import MapError
 from .free_space import MAX_COORDINATE, check_size, free_space, valid
+from .json import RepeatedKey, load_unique
 from .model import PolygonMap
 
 #: Size of a map below which its coordinates may be degrees, and how many times further from (0, 0) it is then, at least.
@@ -86,9 +86,11 @@ def _refuse_degrees(bounds: shapely.Geometry, label: str) -> None:
 
 def _parse_json(text: str) -> Any:
     try:
-        return json.loads(text)
+        return load_unique(text)
     except RecursionError:
         raise MapError("JSON is nested too deep; give a FeatureCollection of polygons") from None
+    except RepeatedKey as error:
+        raise MapError(str(error)) from None
     except ValueError as error:
         raise MapError(f"is no valid JSON ({error}); correct the text") from None
 
