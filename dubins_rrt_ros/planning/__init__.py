@@ -22,10 +22,11 @@ from .curves.dubins import WORDS, CurveError, DubinsCurve
 from .curves.path import Path, PathError
 from .errors import PlanningError
 from .hooks import HookError
+from .maps.cells import FREE, OCCUPIED, UNKNOWN
 from .maps.errors import MapError, MapMetadataError, MapNotFound
 from .maps.files import load_map
 from .maps.grids import save_map
-from .maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map, PolygonMap, Thresholds, rasterise
+from .maps.model import GridMap, Map, PolygonMap, Thresholds, rasterise
 from .option import OptionError, options, values
 from .pictures import PictureError
 from .planner import plan

@@ -16,7 +16,7 @@ from .deadline import Deadline, OutOfTime, never
 from .departure import WholePlans, find_departure
 from .diagnosis import explain
 from .memory import keep_freed_memory
-from .problem import Problem
+from .problem import Problem, demand_problem
 from .proof.background_proof import BackgroundProof
 from .result import Plan, Progress, Status, gap_above, reaches_goal
 from .search.cost import Objective
@@ -69,8 +69,8 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
     Raises:
         HookError: `is_free` of the problem or `sampler` of the settings raised an exception, or gave what it should not.
     """
-    return _Call(problem, (settings or Settings()).with_seed(), cancel or never, on_progress or _ignore, report_samples,
-                 seed_path).answer()
+    return _Call(demand_problem(problem), (settings or Settings()).with_seed(), cancel or never, on_progress or _ignore,
+                 report_samples, seed_path).answer()
 
 
 def _ignore(progress: Progress) -> None:

@@ -160,3 +160,14 @@ def checked_waypoint(name: str, waypoint: Any) -> Waypoint:
         x, y, _ = checked_pose(name, (*numbers[:2], 0.0))
         return x, y, None
     return checked_pose(name, waypoint)
+
+
+def demand_problem(problem: object) -> Problem:
+    """Return a problem.
+
+    Raises:
+        TypeError: it is none.
+    """
+    if not isinstance(problem, Problem):
+        raise TypeError(f"the problem is {quoted(problem)}; give a Problem")
+    return problem

@@ -24,7 +24,7 @@ from .deadline import Deadline, OutOfTime, never
 from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
 from .diagnosis.components import are_separated
 from .planner import AUDIT_RESERVE, SAME, plan
-from .problem import Pose, Problem, Waypoint, checked_waypoint
+from .problem import Pose, Problem, Waypoint, checked_waypoint, demand_problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
@@ -71,7 +71,8 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
         HookError, InvalidPose: a function of the user's is wrong, as `plan` says; a waypoint is none.
     """
     waypoints = tuple(checked_waypoint(f"waypoint {number}", pose) for number, pose in enumerate(poses, 1))
-    call = _Call(problem, waypoints, (settings or Settings()).with_seed(), cancel or never, on_progress, seed_path)
+    settings = (settings or Settings()).with_seed()
+    call = _Call(demand_problem(problem), waypoints, settings, cancel or never, on_progress, seed_path)
     answer = call.answer()
     call.world.field.raise_test_error()
     return replace(answer, waypoints=waypoints)

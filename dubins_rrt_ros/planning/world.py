@@ -10,9 +10,10 @@ from .audit.obstacles import Obstacles, obstacles_of
 from .collision.clearance import ClearanceField
 from .collision.footprint import cover
 from .collision.own_test import OwnTest
-from .maps.model import GridMap, Map
+from .maps.model import GridMap, Map, PolygonMap
 from .problem import Problem
 from .settings import Settings
+from .text import quoted
 from .vehicle import Vehicle
 
 
@@ -95,7 +96,14 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
         allow_unknown: True if it may drive through unknown space.
         previous: a world whose parts are reused where they are the same, of this map or of one that differs in places. It
             makes no difference to the result, and is not kept.
+
+    Raises:
+        TypeError: `map` is no map, or `vehicle` no Vehicle.
     """
+    if not isinstance(map, GridMap | PolygonMap):
+        raise TypeError(f"the map is {quoted(map)}; give a GridMap or a PolygonMap; load_map reads files")
+    if not isinstance(vehicle, Vehicle):
+        raise TypeError(f"the vehicle is {quoted(vehicle)}; give a Vehicle")
     world = World(map, vehicle, allow_unknown)
     if previous is not None and previous.allow_unknown == allow_unknown:
         _reuse(world, previous)

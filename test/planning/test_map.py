@@ -10,10 +10,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning import Problem, Settings, Vehicle, plan
+from dubins_rrt_ros.planning import Problem, Settings, Vehicle, audit_path, plan, plan_through, prepare
+from dubins_rrt_ros.planning.maps.cells import FREE, OCCUPIED, DoubtfulGrid
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
-from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED, DoubtfulGrid, GridMap, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
 
@@ -113,6 +114,25 @@ def test_an_origin_in_degrees_is_taken_with_a_warning():
 def test_what_is_no_map_is_refused_by_a_problem(given):
     with pytest.raises(TypeError, match="give a GridMap, a PolygonMap or a World; load_map reads files"):
         Problem(given, Vehicle(), (0, 0, 0), (1, 0, 0))
+
+
+def test_what_a_function_does_not_take_is_named():
+    """Which was an AttributeError somewhere below."""
+    grid = GridMap(np.zeros((40, 40)), 0.1)
+    problem = Problem(grid, Vehicle(), (1, 1, 0), (3, 3, 0))
+    for call, says in ((lambda: plan(Settings(), problem), "the problem is Settings"),
+                       (lambda: plan(None), "the problem is None"),
+                       (lambda: plan_through(grid, [(1, 2)]), "the problem is GridMap"),
+                       (lambda: prepare(np.zeros((4, 4)), Vehicle()), "give a GridMap or a PolygonMap; load_map reads files"),
+                       (lambda: prepare(grid, (1.0, 0.2)), r"the vehicle is \(1.0, 0.2\); give a Vehicle"),
+                       (lambda: audit_path([(1, 1, 0), (3, 3, 0)], problem), "give a Path, such as that of a Plan")):
+        with pytest.raises(TypeError, match=says):
+            call()
+
+
+def test_rows_of_several_lengths_are_refused():
+    with pytest.raises(MapError, match="rows of cells are not all of one length"):
+        GridMap([[0, 100], [0]], 1.0)
 
 
 def test_one_percent_is_taken_where_percent_is_said():

@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 
 from dubins_rrt_ros.planning import GridMap, Map, MapError, PolygonMap, Vehicle, World, load_map, prepare, save_map
+from dubins_rrt_ros.planning.maps.cells import FREE, OCCUPIED
 from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import find_map, installed_maps
-from dubins_rrt_ros.planning.maps.model import FREE, OCCUPIED
 from dubins_rrt_ros.planning.maps.opening import check_inside
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS, OTHER_ENDINGS
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..hooks import are_free
 from ..problem import Pose, Problem, Waypoint
+from ..text import quoted
 from .departure import judge_clearance
 from .obstacles import Obstacles
 from .sweep import Arcs, any_time, clearance_findings
@@ -61,7 +62,12 @@ def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = Non
         problem: with the map, the vehicle and the ends.
         obstacles: those of the problem's map, where they are at hand, such as a World's.
         check_time: called every few milliseconds; what it raises ends the audit.
+
+    Raises:
+        TypeError: `path` is no Path.
     """
+    if not hasattr(path, "curves"):
+        raise TypeError(f"the path is {quoted(path)}; give a Path, such as that of a Plan")
     if broken := (*_broken_ends(path), *broken_curves(path.curves)):
         return Audit(broken, 0.0, math.inf)
     starts, ends, arcs = driven_arcs(path.curves, path.start)

@@ -10,7 +10,8 @@ import shapely
 from ..collision.clearance import ClearanceField
 from ..collision.raster import CLEARANCE_MARGIN
 from ..deadline import OutOfTime, unlimited
-from ..maps.model import OCCUPIED, UNKNOWN, GridMap
+from ..maps.cells import OCCUPIED, UNKNOWN
+from ..maps.model import GridMap
 from ..problem import Pose, Problem
 from ..result import Status
 from ..search.tree import Tree

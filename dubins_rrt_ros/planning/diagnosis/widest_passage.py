@@ -11,7 +11,8 @@ from .._kernels.widest_path import WidestPathSearch
 from ..collision.clearance import ClearanceField
 from ..collision.raster import CLEARANCE_MARGIN
 from ..deadline import unlimited
-from ..maps.model import FREE, OCCUPIED, UNKNOWN, GridMap, Map
+from ..maps.cells import FREE, OCCUPIED, UNKNOWN
+from ..maps.model import GridMap, Map
 from ..problem import Problem
 from ..vehicle import Point
 from .obstacles import ROUNDING, avoids_unknown, rectangle, strips

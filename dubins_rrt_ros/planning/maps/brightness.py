@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .cells import FREE, OCCUPIED, UNKNOWN
 from .images import Picture
-from .model import DEFAULT_THRESHOLDS, FREE, OCCUPIED, UNKNOWN
+from .model import DEFAULT_THRESHOLDS
 
 MODES = ("trinary", "scale", "raw")
 #: The brightness that trinary files have for free, occupied and unknown cells.

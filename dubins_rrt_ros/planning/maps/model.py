@@ -13,6 +13,7 @@ import shapely
 
 from ..pictures import Plottable, check_matplotlib
 from ..text import quoted
+from .cells import FREE, OCCUPIED, check_meaning, checked_cells
 from .errors import MapError, MapMetadataError
 from .frame import LARGEST_YAW, DoubtfulYaw, Frame, doubt_about_yaw
 from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, polygons_of
@@ -20,7 +21,6 @@ from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, pol
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
 
 class Thresholds(NamedTuple):
@@ -64,14 +64,6 @@ DEFAULT_THRESHOLDS = Thresholds()
 
 #: Smallest side of a cell and largest coordinate [m] that leave rounding far below what the planner guarantees.
 FINEST, FARTHEST = 1e-4, 1e8
-
-
-#: Highest value of a grid [%] from which it is taken for percent without a doubt.
-LEAST_PERCENT = 10
-
-
-class DoubtfulGrid(UserWarning):
-    """A warning: a grid whose values are taken for percent, but may be numbers for kinds of cells."""
 
 
 class _PlottableMap(Plottable):
@@ -118,16 +110,9 @@ class GridMap(_PlottableMap):
 
     def __post_init__(self, percent: bool) -> None:
         _check_name(self.name)
-        if np.ma.is_masked(self.data):
-            raise MapError(f"{self.name}: cells are masked; give the values that they stand for, such as data.filled(-1)")
-        data = np.array(self.data, order="C")
-        if data.ndim != 2:
-            raise MapError(f"{self.name}: cells of shape {data.shape} have not rows and columns alone; give (rows, columns)")
-        if data.size == 0:
-            raise MapError(f"{self.name}: a grid of shape {data.shape} has no cells; give at least one row and column")
-        data = _percentages(data, self.name)
+        data = checked_cells(self.data, self.name)
         if not percent:
-            _check_meaning(data, self.name)
+            check_meaning(data, self.name)
         resolution, origin = _checked_resolution(self.resolution, self.name), _checked_origin(self.origin, self.name)
         rows, columns = data.shape
         if resolution < FINEST or max(map(abs, (*origin[:2], rows * resolution, columns * resolution))) > FARTHEST:
@@ -304,20 +289,6 @@ def _check_name(name: Any) -> None:
         raise MapError(f"the name of a map is {quoted(name)}; give a text, or PolygonMap.of(bounds, obstacles) for obstacles")
 
 
-def _check_meaning(data: np.ndarray, name: str) -> None:
-    """Refuse a grid that is most likely one of 0 and 1, and warn of one that may be of small numbers for kinds of cells."""
-    highest = int(data.max())
-    if highest == 1:
-        raise MapError(f"{name}: cells hold no value above 1, and 1 stands for 1 %, which is free; "
-                       "give 100 for an obstacle, or data == 1, or percent=True if 1 % is meant")
-    doubt = (f"no value above {highest}, which stands for {highest} %" if 1 < highest < LEAST_PERCENT else
-             "1 and 100 and no value between, and 1 stands for 1 %"
-             if highest == OCCUPIED and data.max(where=data < OCCUPIED, initial=FREE) == 1 else "")
-    if doubt:
-        python_warnings.warn(f"{name}: cells hold {doubt} and is free; give 100 for an obstacle and -1 for unknown, or "
-                             "percent=True", DoubtfulGrid, stacklevel=4)
-
-
 def _checked_resolution(resolution: Any, name: str) -> float:
     try:
         number = math.nan if isinstance(resolution, bool | np.bool_) else float(resolution)
@@ -337,28 +308,6 @@ def _checked_origin(origin: Any, name: str) -> tuple[float, float, float]:
         raise MapMetadataError(f"{name}: origin is {quoted(origin)}; give x and y, finite, in metres, and a yaw in radians "
                                f"within {LARGEST_YAW:g} of 0, where rounding leaves its direction exact")
     return x, y, yaw
-
-
-def _percentages(data: np.ndarray, name: str) -> np.ndarray:
-    """Return cells as int8: Booleans as free and occupied, whole numbers from -1 to 100 as they are.
-
-    Raises:
-        MapError: they are something else.
-    """
-    if data.dtype == np.int8:
-        return data
-    if data.dtype == bool:
-        return np.where(data, OCCUPIED, FREE).astype(np.int8)
-    if data.dtype.kind not in "iuf":
-        raise MapError(f"{name}: cells are of type {data.dtype}; give integers, or Booleans, of which True is an obstacle")
-    if not ((data >= UNKNOWN) & (data <= OCCUPIED)).all():
-        raise MapError(f"{name}: cells hold values from {data.min()} to {data.max()}; give -1 (unknown), or 0 to 100")
-    cells = data.astype(np.int8)
-    fractions = data[cells != data]
-    if fractions.size:
-        raise MapError(f"{name}: a cell holds {fractions[0]:g}; give whole percent from 0 (free) to 100 (occupied), such as "
-                       "100 * data rounded where they are probabilities")
-    return cells
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
