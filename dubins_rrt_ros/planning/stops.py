@@ -1,7 +1,7 @@
 """The places that a path over waypoints passes, and the legs between them of a path that is known."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -71,13 +71,22 @@ def _poses(place: Waypoint) -> list[Pose]:
     return [(x, y, heading) for heading in headings]
 
 
-def least_length(problem: Problem, waypoints: Sequence[Waypoint]) -> float:
-    """Return a length that no path over the waypoints falls below [m]."""
-    goal = (*problem.goal[:2], problem.goal[2] if problem.yaw_tolerance == 0 else None)
-    bounds = [math.dist(here[:2], there[:2]) if here[2] is None or there[2] is None
-              else dubins.shortest((*here[:2], here[2]), (*there[:2], there[2]), problem.vehicle.turning_radius).length
-              for here, there in pairwise((problem.start, *waypoints, goal))]
+def least_length(problem: Problem, waypoints: Sequence[Waypoint], proved: Mapping[tuple[Waypoint, Waypoint], float]) -> float:
+    """Return a length that no path over the waypoints falls below [m].
+
+    Args:
+        proved: lengths that paths between two places, of which the first has a heading, do not fall below [m].
+    """
+    radius = problem.vehicle.turning_radius
+    bounds = [max(proved.get((here, there), 0.0), math.dist(here[:2], there[:2]) if here[2] is None or there[2] is None
+                  else dubins.shortest((*here[:2], here[2]), (*there[:2], there[2]), radius).length)
+              for here, there in pairwise((problem.start, *waypoints, last_place(problem)))]
     return max(0.0, math.fsum(bounds) * (1 - SAME) - problem.goal_tolerance_xy)
+
+
+def last_place(problem: Problem) -> Waypoint:
+    """Return the goal, without a heading where that has a tolerance."""
+    return (*problem.goal[:2], problem.goal[2] if problem.yaw_tolerance == 0 else None)
 
 
 def legs_along(path: Path, stops: Sequence[Stop]) -> list[Path] | None:

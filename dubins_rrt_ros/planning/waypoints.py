@@ -35,7 +35,7 @@ from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings
-from .stops import HEADINGS, Stop, least_length, legs_along, passing_indices, stops_of
+from .stops import HEADINGS, Stop, last_place, least_length, legs_along, passing_indices, stops_of
 from .work import Work
 from .world import problem_with_costs, world_of
 
@@ -98,6 +98,7 @@ class _Call:
         self._seed_path, self._seeded = seed_path, set[int]()  # numbers of the legs that a part of it is a path of
         self._rng = np.random.default_rng((settings.seed, 4))  # the numbers that Smoother.simplify draws too, no others
         self._failures: dict[int, Plan] = {}  # by the id of the leg
+        self._proved: dict[tuple[Waypoint, Waypoint], float] = {}  # lower bounds of legs between poses [m]
         self._time_to_first: float | None = None
         self._aim = self._free_goal()
 
@@ -293,13 +294,13 @@ class _Call:
         for left, n in zip(range(len(some), 0, -1), some, strict=True):
             if self._clock.poll():
                 break
-            problem = Problem(self.world, start=paths[n].start, goal=paths[n].end)
-            if n == last:
-                problem = replace(self._problem, start=paths[n].start)
+            problem = (replace(self._problem, start=paths[n].start) if n == last
+                       else Problem(self.world, start=paths[n].start, goal=paths[n].end))
             settings = replace(self._settings, samples=max(1, self._settings.samples // len(some)),
                                planning_time=self._time(0.9 / left))
             found = plan(problem, settings, cancel=self._cancel, seed_path=paths[n])
             self._samples += found.samples
+            self._proved[problem.start, last_place(problem)] = found.lower_bound if found.path else 0.0
             if found.path and self._cost([found.path]) < self._cost([paths[n]]):
                 paths[n] = found.path
         return paths
@@ -325,7 +326,7 @@ class _Call:
         count = len(self._waypoints)
         message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
                    f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s{end_clause(self._problem, path)}.")
-        bound = min(least_length(self._problem, self._waypoints), path.length)
+        bound = min(least_length(self._problem, self._waypoints, self._proved), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
                             roomy_share=self._objective.roomy_share(path), found_by=self._found_by,

@@ -30,8 +30,9 @@ from dubins_rrt_ros.planning.audit import audit_path
 from dubins_rrt_ros.planning.audit.verdict import passing_findings
 from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.deadline import OutOfTime
+from dubins_rrt_ros.planning.maps.locate import maps_directory
 from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
-from dubins_rrt_ros.planning.stops import legs_along, stops_of
+from dubins_rrt_ros.planning.stops import least_length, legs_along, stops_of
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
@@ -103,6 +104,19 @@ def test_in_the_open_plane_the_whole_is_shortest(plane):
         shorter += answer.length < greedy
         assert answer.lower_bound <= answer.length
     assert shorter >= 0.9 * differs
+
+
+@needs_compiled
+def test_where_waypoints_have_headings_the_bound_is_the_sum_of_what_is_proved_of_the_legs():
+    """With a free heading a leg's proof, which is of one heading, does not count."""
+    maze = Problem(prepare(load_map(maps_directory() / "maze.yaml"), Vehicle()), start=(1.5, 2.0, 1.57), goal=(13.5, 10.5, 1.57))
+    settings = Settings(samples=100, planning_time=120.0, seed=1, stop_gap=0.05, preferred_clearance=0.0)
+    poses = plan(maze, replace(settings, samples=1, stop_gap=0.0)).path.poses(0.1)
+    place = tuple(poses[len(poses) // 2].tolist())
+    answer = plan_through(maze, [place], settings)
+    assert least_length(maze, [place], {}) * 1.1 < answer.lower_bound <= answer.length <= 1.06 * answer.lower_bound
+    free = [place[:2]]
+    assert plan_through(maze, free, settings).lower_bound == least_length(maze, [(*place[:2], None)], {})
 
 
 @needs_compiled
