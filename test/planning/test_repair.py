@@ -96,9 +96,9 @@ def test_a_chain_that_is_far_from_any_path_costs_little(middle, tunnel, seed, mo
         def __getattr__(self, name):
             return getattr(self.fit, name)
 
-        def cost(self, tried, limit):
+        def begin(self, tried):
             lengths.append(float(tried.sum()))
-            return self.fit.cost(tried, limit)
+            return self.fit.begin(tried)
 
     monkeypatch.setattr(repair_module, "ArcFit", Recorded)
     monkeypatch.setattr(repair_module, "HOPELESS", math.inf)
@@ -141,17 +141,34 @@ def test_the_normal_equations_are_those_of_the_residuals(middle, tunnel, points)
     fit = ArcFit(ClearanceField(tunnel).kernel, 1.0, middle.start, middle.end, turns, points)
     lengths = middle.lengths[1:].ravel() * 1.02 + 0.01
     fit.require(0.21, 0.1, 2 * float(lengths.sum()))
-    gradient, curvature = np.empty(len(turns)), np.empty((len(turns), len(turns)))
-    assert fit.cost(lengths, math.inf) > 1e-3
-    fit.normal_equations(gradient, curvature)
+
+    def cost(lengths):
+        total = fit.begin(lengths)
+        while not fit.measured:
+            total = fit.measure(total, math.inf)
+        return total
+
+    gradient, curvature = np.zeros(len(turns)), np.zeros((len(turns), len(turns)))
+    assert cost(lengths) > 1e-3
+    while not fit.differentiated:
+        fit.differentiate(gradient, curvature)
     for i in range(len(turns)):
         step = np.zeros(len(turns))
         step[i] = 1e-6
-        difference = fit.cost(lengths + step, math.inf) - fit.cost(lengths - step, math.inf)
+        difference = cost(lengths + step) - cost(lengths - step)
         assert difference / 4e-6 == pytest.approx(gradient[i], rel=1e-3, abs=1e-4)
     assert np.array_equal(curvature, curvature.T)
     assert np.linalg.eigvalsh(curvature).min() > -1e-9
-    assert fit.cost(lengths, 1e-6) == math.inf
+
+
+@needs_compiled
+def test_a_fit_with_many_samples_takes_its_course_in_slices(middle, tunnel):
+    """So that the work may be over soon, whatever the length of the path is in turning radii."""
+    path, work = spoilt(middle, 2), Work()
+    fit = repair_module._Fit(path, ClearanceField(tunnel).kernel, repair_module.DISC, work)
+    fit.run(0.2007, 60, 5e-4, 1e-9)
+    assert fit.is_done and work.done > 100
+    assert fit.path().length == pytest.approx(repair(path, tunnel).length, rel=1e-3)
 
 
 def test_where_no_step_is_to_be_had_there_is_no_path(middle, tunnel, monkeypatch):

@@ -22,6 +22,8 @@ else:
 GOAL_WEIGHT = cython.declare(cython.double, 3.0)
 #: Step of the differences by which the clearance is differentiated [turning radii].
 DIFFERENCE = cython.declare(cython.double, 1e-7)
+#: Number of samples after which a slice of the residuals ends, and of their derivatives: some milliseconds.
+SLICE, DERIVATIVE_SLICE = cython.declare(cython.int, 4096), cython.declare(cython.int, 512)
 
 
 @cython.final
@@ -29,8 +31,13 @@ DIFFERENCE = cython.declare(cython.double, 1e-7)
 class ArcFit:
     """The residuals of a chain of arcs between two poses, in turning radii.
 
+    They take time where there are many samples, so that it is spent in slices: `begin` a chain and `measure` its samples until it
+    is `measured`; then `differentiate` them until they are `differentiated`.
+
     Attributes:
-        largest: the greatest absolute value of the residuals that `cost` was asked for last.
+        ends: (n + 1, 3) poses at the start, and at the ends of the arcs.
+        largest: the greatest absolute value of the residuals so far.
+        measured, differentiated: True if all samples are.
     """
 
     def __init__(self, clearance: Clearance, radius, start, goal, turns, points):
@@ -50,7 +57,9 @@ class ArcFit:
         self.row = np.zeros(len(turns))
         self.errors = np.zeros(3)
         self.required = self.spacing = self.largest = 0
-        self.size = 0
+        self.size = self.next_arc = self.next_sample = 0
+        self.measured = self.differentiated = False
+        self.lengths = np.empty(0)
         self.arcs = np.empty(0, np.int32)
         self.samples = np.empty((0, 7))
 
@@ -67,26 +76,41 @@ class ArcFit:
         self.arcs = np.empty(capacity, np.int32)
         self.samples = np.empty((capacity, 7))
 
-    def cost(self, lengths: cython.double[::1], limit: cython.double) -> cython.double:
-        """Return the sum of the squares of the residuals of a chain with these lengths of arcs [m], infinite above `limit`."""
-        total: cython.double
-        arc: cython.int
-        self.size = 0
-        with cython.nogil:
-            total = self.measure_goal(lengths)
-            for arc in range(cython.cast(cython.int, self.turns.shape[0])):
-                if total > limit:
-                    break
-                total += self.measure_arc(arc, lengths[arc], limit - total)
-        return total if total <= limit else float("inf")
+    def begin(self, lengths: cython.double[::1]) -> cython.double:
+        """Take these lengths of the arcs [m]; return the sum of the squares of the errors at the goal."""
+        self.lengths = lengths
+        self.size, self.next_arc, self.next_sample = 0, 0, 0
+        self.measured, self.differentiated = self.turns.shape[0] == 0, False
+        return self.measure_goal()
 
-    def measure_goal(self, lengths):
+    def measure(self, total: cython.double, limit: cython.double) -> cython.double:
+        """Measure a slice of the samples.
+
+        Args:
+            total: the sum of the squares so far ...
+            limit: ... and that from which on no more are measured.
+
+        Returns:
+            The sum with those of the slice.
+        """
+        left: cython.double = SLICE
+        arc: cython.int = self.next_arc
+        with cython.nogil:
+            while arc < self.turns.shape[0] and left > 0 and total <= limit:
+                left -= self.lengths[arc] / self.spacing * self.points.shape[0]
+                total += self.measure_arc(arc, self.lengths[arc], limit - total)
+                arc += 1
+        self.next_arc = arc
+        self.measured = arc == self.turns.shape[0]
+        return total
+
+    def measure_goal(self):
         """Place the ends of the arcs; return the sum of the squares of the errors at the goal."""
         at: Pose = self.start
         arc: cython.int
         self.ends[0, 0], self.ends[0, 1], self.ends[0, 2] = at.x, at.y, at.theta
         for arc in range(cython.cast(cython.int, self.turns.shape[0])):
-            at = drive(at, self.radius, self.turns[arc], lengths[arc])
+            at = drive(at, self.radius, self.turns[arc], self.lengths[arc])
             self.ends[arc + 1, 0], self.ends[arc + 1, 1], self.ends[arc + 1, 2] = at.x, at.y, at.theta
         self.errors[0] = GOAL_WEIGHT * (at.x - self.goal.x) / self.radius
         self.errors[1] = GOAL_WEIGHT * (at.y - self.goal.y) / self.radius
@@ -138,31 +162,33 @@ class ArcFit:
             self.largest = max(self.largest, self.samples[i, 6])
         return lacking
 
-    def normal_equations(self, gradient: cython.double[::1], curvature: cython.double[:, ::1]):
-        """Write the sums of J r and J J^T over the residuals r of the last `cost`, with their derivatives J by the lengths [1/m].
+    def differentiate(self, gradient: cython.double[::1], curvature: cython.double[:, ::1]):
+        """Write the sums of J r and J J^T over the residuals r, with their derivatives J by the lengths [1/m]; those of a slice.
 
         Args:
-            gradient: (n,) filled.
-            curvature: (n, n) filled, symmetric.
+            gradient: (n,) added to, from 0 on.
+            curvature: (n, n) added to, from 0 on; below the diagonal and on it until the last slice, which makes it symmetric.
         """
         n: cython.int = cython.cast(cython.int, self.turns.shape[0])
-        i: cython.Py_ssize_t
+        i: cython.Py_ssize_t = self.next_sample
+        end: cython.Py_ssize_t = min(self.size, i + DERIVATIVE_SLICE)
         j: cython.int
         k: cython.int
         with cython.nogil:
-            for j in range(n):
-                gradient[j] = 0
-                for k in range(n):
-                    curvature[j, k] = 0
-            for i in range(3):
-                self.differentiate_goal(i)
-                self.accumulate(n, self.errors[i], gradient, curvature)
-            for i in range(self.size):
+            if i == 0:
+                for j in range(3):
+                    self.differentiate_goal(j)
+                    self.accumulate(n, self.errors[j], gradient, curvature)
+            while i < end:
                 self.differentiate_sample(i)
                 self.accumulate(self.arcs[i] + 1, self.samples[i, 6], gradient, curvature)
-            for j in range(n):
-                for k in range(j):
-                    curvature[k, j] = curvature[j, k]
+                i += 1
+            if end == self.size:
+                for j in range(n):
+                    for k in range(j):
+                        curvature[k, j] = curvature[j, k]
+        self.next_sample = end
+        self.differentiated = end == self.size
 
     def accumulate(self, n, residual, gradient, curvature):
         """Add a residual whose derivatives, by the first `n` lengths, are in `row`: below the diagonal and on it."""

@@ -33,6 +33,8 @@ DAMPING, LEAST_DAMPING, MOST_DAMPING, RISE, FALL = 1e-4, 1e-9, 1e6, 4.0, 5.0
 MOST_SOLUTIONS = 6
 #: Maximum length of a chain that is tried, relative to the length at first: a step can lead anywhere.
 MOST_LONGER = 2.0
+#: Maximum number of arcs of a chain: a step takes time with the third power of that.
+MOST_ARCS = 300
 #: Length of an arc that is left out [turning radii].
 NEGLIGIBLE = 1e-9
 #: The point of a disc whose clearance counts, in the vehicle's frame, and what that exceeds the required one by [m].
@@ -52,9 +54,11 @@ def repaired(path: Path, clearance: Clearance, required: float, lacking: float, 
         required: clearance to keep at samples [m].
         lacking: how much less than that `path` keeps at most [m].
         is_free: judges a path that keeps it, between the samples too.
-        work: counts the iterations; once it is over there is no path.
+        work: counts slices of the iterations; once it is over there is no path.
     """
     fit = _Fit(path, clearance, DISC, work)
+    if fit.size > MOST_ARCS:
+        return None
     for shortfall in SHORTFALLS:
         if fit.run(required - shortfall * lacking, ITERATIONS, COARSE_SPACING, COARSE_PRECISION) > HOPELESS:
             return None
@@ -82,6 +86,11 @@ class _Fit:
         self._residuals = ArcFit(clearance, path.radius, path.start, path.end, self._turns, points)
         self.is_done = False
 
+    @property
+    def size(self) -> int:
+        """The number of arcs."""
+        return len(self._turns)
+
     def run(self, required: float, iterations: int, spacing: float, precision: float) -> float:
         """Fit the lengths for so many iterations, or until no residual is above `precision` [turning radii].
 
@@ -93,17 +102,16 @@ class _Fit:
             The sum of the squares of the residuals.
         """
         self._residuals.require(required, spacing * self._path.radius, self._longest)
-        gradient, curvature = np.empty(len(self._turns)), np.empty((len(self._turns), len(self._turns)))
-        cost, damping = float(self._residuals.cost(self._lengths, math.inf)), DAMPING
+        cost, damping = self._cost(self._lengths, math.inf), DAMPING
         for _ in range(iterations):
-            self.is_done = self._residuals.largest < precision
-            if self.is_done or not self._work.begins():
+            self.is_done = cost < math.inf and self._residuals.largest < precision
+            derivatives = None if self.is_done else self._derivatives()
+            if derivatives is None:
                 break
-            self._residuals.normal_equations(gradient, curvature)
             while True:
-                lengths = self._stepped(gradient, curvature, damping)
+                lengths = self._stepped(*derivatives, damping)
                 is_short = bool(lengths.sum() <= self._longest)  # NaN is not
-                next_cost = float(self._residuals.cost(lengths, cost)) if is_short else math.inf
+                next_cost = self._cost(lengths, cost) if is_short else math.inf
                 if next_cost < cost:
                     break
                 damping *= RISE
@@ -113,13 +121,32 @@ class _Fit:
             self._lengths, cost = lengths, next_cost
         return cost
 
+    def _cost(self, lengths: np.ndarray, limit: float) -> float:
+        """Return the sum of the squares of the residuals; infinite above `limit`, and where the work is over."""
+        residuals = self._residuals
+        total = float(residuals.begin(lengths))
+        while total <= limit and not residuals.measured:
+            if not self._work.begins():
+                return math.inf
+            total = float(residuals.measure(total, limit))
+        return total if total <= limit else math.inf
+
+    def _derivatives(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the gradient and the curvature of half the cost that was asked for last; None where the work is over."""
+        gradient, curvature = np.zeros(len(self._turns)), np.zeros((len(self._turns), len(self._turns)))
+        while not self._residuals.differentiated:
+            if not self._work.begins():
+                return None
+            self._residuals.differentiate(gradient, curvature)
+        return gradient, curvature
+
     def path(self) -> Path:
         """Return the chain as a path, each arc of it a curve; it ends at the goal to the last bit."""
         words, lengths = np.zeros(len(self._turns) + 1, np.int8), np.zeros((len(self._turns) + 1, 3))
         for i, (turn, length) in enumerate(zip(self._turns.tolist(), self._lengths.tolist(), strict=True), 1):
             words[i], place = _SINGLE[turn]
             lengths[i, place] = length
-        self._residuals.cost(self._lengths, math.inf)
+        self._residuals.begin(self._lengths)
         waypoints = np.array(self._residuals.ends)
         waypoints[-1] = self._path.end
         return Path(waypoints, words, lengths, self._path.radius)
