@@ -28,7 +28,7 @@ def runs_on(problem, **options):
 def first_path(problem, portion=256):
     """The first path, or None, and the runs."""
     runs, expanded = runs_on(problem), 0
-    while not runs.exhausted and expanded < scaled(100_000, least=10_000):
+    while not runs.exhausted and expanded < scaled(100_000, least=25_000):
         if found := runs.run(portion, math.inf):
             return found, runs
         expanded += portion
