@@ -177,6 +177,14 @@ def test_a_file_of_problems_that_is_none_takes_one_line(document, says, capsys):
     assert not Path("runs.jsonl").exists()
 
 
+def test_what_the_output_had_is_kept_until_there_is_a_first_line(capsys):
+    Path("runs.jsonl").write_text("of before\n")
+    Path("set/bad.wkt").write_text("POLYGON ((0 0, 1")
+    assert "bad.wkt" in refusal(problems(entry(map="bad.wkt")), "--out", "runs.jsonl", *BUDGET, capsys=capsys)
+    assert Path("runs.jsonl").read_text() == "of before\n"
+    assert [line["problem"] for line in bench(problems(entry()), *BUDGET)] == ["hall"]
+
+
 def test_files_that_cannot_be_read_take_one_line(capsys):
     assert "gone.json cannot be read: No such file" in refusal("gone.json", "--out", "runs.jsonl", capsys=capsys)
     Path("torn.json").write_text('[{"name":')

@@ -321,6 +321,15 @@ def test_a_plot_may_be_an_animation_of_the_search(hall, capsys, monkeypatch):
     assert Image.open("p.gif").n_frames > 10
 
 
+@pytest.mark.slow
+def test_an_animation_changes_no_path(hall, capsys, monkeypatch):
+    monkeypatch.setattr("dubins_rrt_ros.planning.pictures.animation.MOST_FRAMES", 12)
+    for more in (["--json", "without.json"], ["--json", "with.json", "--plot", "p.gif"]):
+        assert run(hall, *REQUEST, *BUDGET, *more, capsys=capsys)[0] == 0
+    without, animated = (json.loads(Path(file).read_text()) for file in ("without.json", "with.json"))
+    assert [animated[key] for key in ("curves", "samples", "cost")] == [without[key] for key in ("curves", "samples", "cost")]
+
+
 def test_a_video_without_ffmpeg_is_refused_before_planning(hall, capsys, monkeypatch):
     monkeypatch.setenv("PATH", "")
     assert "install the package ffmpeg" in refusal(hall, *REQUEST, "--plot", "p.mp4", capsys=capsys)

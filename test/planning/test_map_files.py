@@ -9,7 +9,7 @@ import pytest
 import shapely
 from PIL import Image
 from support.images import pgm, row_of
-from support.map_files import FIELDS, refusal, write_grid, yaml_of
+from support.map_files import FIELDS, image_named, refusal, write_grid, yaml_of
 
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
 from dubins_rrt_ros.planning.maps.files import load_map
@@ -32,6 +32,18 @@ def test_origin_with_yaw_places_the_cells(tmp_path):
     assert grid.origin == (1, 2, np.pi / 2)
     assert grid.resolution == 0.1
     np.testing.assert_allclose(grid.to_map_frame(np.array([0.3, 0.1])), [0.9, 2.3])
+
+
+@pytest.mark.parametrize(("name", "remedy"), [
+    ("m.jpg", "other pictures have to be converted to PNG"), ("m.png", "convert it as one of them"),
+    ("m.yaml", "image 'm.jpg' has not the content of a PGM")], ids=["by name", "by content", "in a YAML file"])
+def test_a_jpeg_is_to_be_converted(tmp_path, name, remedy):
+    Image.new("L", (20, 20), 255).save(tmp_path / "m.jpg")
+    if name == "m.png":
+        (tmp_path / "m.jpg").rename(tmp_path / name)
+    image_named(tmp_path, "m.jpg")
+    message = refusal(tmp_path / name, resolution=None if name == "m.yaml" else 0.05)
+    assert remedy in message and "give the side of its cells" not in message
 
 
 @pytest.mark.parametrize("thresh, expected", [("0.25", 0), ("0.196", -1)])

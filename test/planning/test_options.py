@@ -168,6 +168,17 @@ def test_a_yaw_that_was_likely_meant_in_degrees_is_doubted():
     assert problem.goal == (2.0, 2.0, 90.0) and len(warned) == 1 and warned[0].filename == __file__
 
 
+@pytest.mark.parametrize(("make", "asks"), [
+    (lambda: Vehicle(wheelbase=1.0, max_steering_angle=28), "; did you mean 0.4887 (28 degrees)?"),
+    (lambda: Problem(MAP, Vehicle(), (1, 1, 0), (2, 2, 0), goal_tolerance_yaw=10.0), "; did you mean 0.1745 (10 degrees)?"),
+    (lambda: Vehicle(wheelbase=1.0, max_steering_angle=200), None),
+    (lambda: Vehicle(turning_radius=-28), None)], ids=["steering", "tolerance", "too much", "no angle"])
+def test_an_angle_out_of_range_is_asked_about_in_degrees(make, asks):
+    with pytest.raises(OptionError) as refused:
+        make()
+    assert str(refused.value).endswith(asks) if asks else "did you mean" not in str(refused.value)
+
+
 def test_what_counts_as_an_exact_goal():
     make = MAKE[Problem]
     assert make().exact_goal

@@ -4,6 +4,7 @@ import io
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib.figure
 import matplotlib.pyplot
@@ -14,7 +15,7 @@ from support.cases import empty_map
 
 from dubins_rrt_ros.planning import GridMap, PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
-from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording, save_drive
+from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, Recording, _SearchScreen, save_drive
 
 EVERY, SAMPLES = 7, 60
 
@@ -130,6 +131,13 @@ def test_a_gif_shows_every_frame_and_ends_with_the_answer(tmp_path):
     orange = [int(drawing.PATH[i:i + 2], 16) for i in (1, 3, 5)]
     assert first.shape == last.shape
     assert (np.abs(last.astype(int) - orange) < 12).all(axis=2).sum() > 300
+
+
+def test_the_bound_of_an_animation_never_falls():
+    recording, result, _ = recorded(every=20)
+    recording._add(replace(result, lower_bound=0.0))  # the proof of the recorded search went further
+    bounds = [frame.lower_bound for frame in _SearchScreen(recording._frames)._frames]
+    assert bounds == sorted(bounds) and bounds[-1] > 0
 
 
 def test_a_page_holds_its_frames_and_needs_no_network(tmp_path):

@@ -105,7 +105,7 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
             raise UsageError(f"{where}: its {key} is {quoted(entry[key])}; give a text")
     where, map_file = f"{where}, {entry['name']}", folder / entry["map"]
     if not os.path.isfile(map_file):  # pathlib's is_file() raises for a name that is too long
-        raise UsageError(one_line(f"{where}: there is no map file {map_file}"))
+        raise UsageError(one_line(f"{where}: there is no map file {map_file}; its name is relative to the file of problems"))
     _check_keys(entry, where)
     try:
         vehicle = Vehicle(**dict(_given(Vehicle, entry)))

@@ -12,6 +12,7 @@ import json
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, NamedTuple
@@ -187,8 +188,10 @@ class _SearchScreen(_Screen):
 
     def __init__(self, frames: Sequence[Frame]):
         super().__init__(frames[-1].drawing.map)
-        self._frames = frames
-        values = (value for one in frames for value in (one.length, one.lower_bound))
+        # A search that is recorded takes longer, and the proof beside it may get further than that of the answer.
+        bounds = accumulate((one.lower_bound for one in frames), max)
+        self._frames = [one._replace(lower_bound=bound) for one, bound in zip(frames, bounds, strict=True)]
+        values = (value for one in self._frames for value in (one.length, one.lower_bound))
         known = [value for value in values if value is not None and np.isfinite(value)]
         margin = 0.08 * (max(known) - min(known)) or 1.0
         self._curves.set(xlim=(0, max(1, frames[-1].samples)), ylim=(min(known) - margin, max(known) + margin), xlabel="samples",
