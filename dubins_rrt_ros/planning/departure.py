@@ -1,20 +1,22 @@
 """Departures: ways out of a start that is too near to an obstacle, which the search goes on from.
 
 Straight on, and in turns to either side, the vehicle drives until it is free. On the way it may come no nearer to an obstacle
-than it is at the start: the footprint, made smaller by as much as it overlaps there, has to be free all along. The audit, which
-measures that to a millionth of a metre, decides which ways will do.
+than it is at the start: the footprint, made smaller by as much as it overlaps there, has to be free all along. Once it was clear
+it may touch nothing any more. The audit, which measures that to a millionth of a metre, decides which ways will do.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from ._kernels.collision import CollisionChecker
 from .answer import defect_message, not_audited_message
-from .audit.departure import judge_departure
+from .audit.departure import judge_clearance
+from .audit.sweep import CONTACT
 from .audit.verdict import Audit, audit_path, driven_arcs, in_order
 from .collision.clearance import ClearanceField
 from .collision.raster import CLEARANCE_MARGIN
@@ -23,7 +25,7 @@ from .curves.dubins import DubinsCurve
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime
 from .maps.model import GridMap
-from .problem import Problem
+from .problem import Pose, Problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
@@ -35,13 +37,15 @@ from .world import World
 
 #: Lengths driven straight on before a turn, in sizes of the vehicle, and angles turned before going straight on [rad].
 STRAIGHTS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-ANGLES = np.geomspace(0.02, math.pi, 16)
+ANGLES = np.geomspace(0.02, math.pi, 16).tolist()
+#: The same where none of these will do: where there is room for the tail to swing a little, only slight turns will.
+MORE_STRAIGHTS, MORE_ANGLES = np.arange(0.1, 4.0, 0.1).tolist(), np.geomspace(0.005, 1.5, 120).tolist()
 #: Length of the straight part after a turn, in sizes of the vehicle.
 AFTER_TURN = 4.0
+#: Lengths for which the vehicle should be able to go on from where it is free, in sizes of the vehicle.
+LEADS = (0.5, 1.0, 2.0)
 #: Distance between the poses that are tried as the end, in sizes of the vehicle.
 STEP = 0.02
-#: Maximum number of departures that the audit looks at.
-MAX_AUDITED = 12
 #: Number of times that the interval is halved in which the depth at the start lies; and number of swings into obstacles that are
 #: tried where no way leads out, and times that the interval between two of them is halved.
 HALVINGS, SWINGS, SWING_HALVINGS = 30, 8, 5
@@ -160,23 +164,45 @@ def _found(problem: Problem, world: World, occupied: str, check_time: Callable[[
     depth = depth if depth > ROUNDING else 0.0
     if depth > problem.start_slack + ROUNDING:
         return Departure(None, *_too_deep(problem, occupied, depth))
-    smaller = _smaller(problem.vehicle, depth + 1.5 * CLEARANCE_MARGIN)
+    smaller = _smaller(problem.vehicle, depth + CLEARANCE_MARGIN + CONTACT + ROUNDING)
     if smaller is not None:
-        to_goal = CostToGo.to_goal(problem, field)
-        found = sorted(_ways_out(problem, field, smaller, check_time), key=lambda path: _promise(path, problem, to_goal))
-        for path in found[:MAX_AUDITED]:
+        for path in _candidates(problem, field, smaller, check_time):
             arcs = in_order(driven_arcs(path.curves, path.start)[2], len(path.curves))
-            if not judge_departure(arcs, problem, world.obstacles, check_time).findings:
+            if not judge_clearance(arcs, problem, world.obstacles, check_time)[0]:
                 near = f"{metres(depth)} m too near to" if depth > 0 else "within a millimetre of"
                 return Departure(path, f"the start is {near} an obstacle, which is left within {path.length:.2f} m")
     return Departure(None, _no_way_out(problem, field, occupied, depth, check_time))
 
 
-def _ways_out(problem: Problem, field: ClearanceField, smaller: Vehicle, check_time: Callable[[], None]) -> Iterator[Path]:
-    """Yield paths to a pose that is free, along which the smaller vehicle is free."""
+def _candidates(problem: Problem, field: ClearanceField, smaller: Vehicle, check_time: Callable[[], None]) -> Iterator[Path]:
+    """Yield paths to a pose that is free, the most promising first, and those along more curves where these will not do."""
+    to_goal = CostToGo.to_goal(problem, field)
+    whole = field.collision_checker(problem.vehicle)
+
+    def promise(path: Path) -> tuple[int, float]:
+        return -_leads_on(path.end, problem.vehicle, whole), _promise(path, problem, to_goal)
+
+    for curves in (_curves(problem, STRAIGHTS, ANGLES), _curves(problem, MORE_STRAIGHTS, MORE_ANGLES)):
+        yield from sorted(_ways_out(problem, field, smaller, curves, check_time), key=promise)
+
+
+def _leads_on(pose: Pose, vehicle: Vehicle, checker: CollisionChecker) -> int:
+    """Return how many of LEADS the vehicle can drive on from a pose, straight on or in a turn."""
+    def is_free(word: str, lengths: tuple[float, float, float]) -> bool:
+        curve = DubinsCurve(pose, vehicle.turning_radius, word, lengths)
+        return checker.is_motion_free(pose, curve.radius, curve.index, curve.lengths)
+
+    leads = (lead * _size(vehicle) for lead in LEADS)
+    return sum(is_free("LSL", (0.0, lead, 0.0)) or is_free("LSL", (lead, 0.0, 0.0)) or is_free("RSR", (lead, 0.0, 0.0))
+               for lead in leads)
+
+
+def _ways_out(problem: Problem, field: ClearanceField, smaller: Vehicle, curves: Iterable[DubinsCurve],
+              check_time: Callable[[], None]) -> Iterator[Path]:
+    """Yield paths along curves to a pose that is free, along which the smaller vehicle is free."""
     checker, vehicle = field.collision_checker(smaller), problem.vehicle
     whole = field.collision_checker(vehicle)
-    for curve in _curves(problem):
+    for curve in curves:
         check_time()
         lengths = np.array(curve.lengths)
         for length in np.arange(1, math.floor(curve.length / _step(vehicle))) * _step(vehicle):
@@ -191,13 +217,13 @@ def _ways_out(problem: Problem, field: ClearanceField, smaller: Vehicle, check_t
                 break
 
 
-def _curves(problem: Problem) -> Iterator[DubinsCurve]:
+def _curves(problem: Problem, straights: Iterable[float], angles: Iterable[float]) -> Iterator[DubinsCurve]:
     """Yield the curves from the start that may lead out of it: straight on and then a turn, and the other way round."""
     radius, size = problem.vehicle.turning_radius, _size(problem.vehicle)
     for word in ("LSL", "RSR"):
-        for straight in STRAIGHTS:
+        for straight in straights:
             yield DubinsCurve(problem.start, radius, word, (0.0, straight * size, math.pi * radius))
-        for angle in ANGLES.tolist():
+        for angle in angles:
             yield DubinsCurve(problem.start, radius, word, (angle * radius, AFTER_TURN * size, 0.0))
     yield DubinsCurve(problem.start, radius, "LSL", (0.0, 2 * AFTER_TURN * size, 0.0))
 
@@ -287,8 +313,8 @@ def _no_way_out(problem: Problem, field: ClearanceField, occupied: str, depth: f
     near = f"the start is {metres(depth)} m too near, within start_slack {problem.start_slack:g} m, but"
 
     def leads_out(deeper: float) -> bool:
-        smaller = _smaller(problem.vehicle, depth + deeper)
-        return smaller is not None and next(_ways_out(problem, field, smaller, check_time), None) is not None
+        smaller, curves = _smaller(problem.vehicle, depth + deeper), _curves(problem, STRAIGHTS, ANGLES)
+        return smaller is not None and next(_ways_out(problem, field, smaller, curves, check_time), None) is not None
 
     swings = np.linspace(0, problem.vehicle.circumscribed_radius - depth, SWINGS + 1).tolist()
     enough = next((n for n, swing in enumerate(swings) if n and leads_out(swing)), None)

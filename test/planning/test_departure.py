@@ -11,6 +11,7 @@ import pytest
 import shapely
 from support.cases import needs_compiled
 
+from dubins_rrt_ros.evaluation.families.buildings import building
 from dubins_rrt_ros.planning import (
     GridMap,
     Path,
@@ -20,6 +21,7 @@ from dubins_rrt_ros.planning import (
     Status,
     Vehicle,
     audit_path,
+    load_map,
     plan,
     plan_through,
     planner,
@@ -29,7 +31,7 @@ from dubins_rrt_ros.planning import (
 from dubins_rrt_ros.planning import departure as departures
 from dubins_rrt_ros.planning.audit.departure import start_room
 from dubins_rrt_ros.planning.curves.dubins import DubinsCurve
-from dubins_rrt_ros.planning.deadline import OutOfTime
+from dubins_rrt_ros.planning.deadline import OutOfTime, never
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.32, 0.36), (-0.48, 0.36), (-0.48, -0.36), (0.32, -0.36)], turning_radius=0.4)
@@ -134,6 +136,36 @@ def test_a_cell_that_reaches_in_by_no_more_than_the_slack_is_left_behind():
     assert left(spoiled, CAR, (5.0, 4.0, 0.0), 0.0).status == Status.START_OCCUPIED
     answer = left(spoiled, CAR, (5.0, 4.0, 0.0), 0.1)
     assert answer.solved and answer.start_too_near
+
+
+SHORT_CAR = Vehicle.from_footprint([(0.32, 0.26), (-0.48, 0.26), (-0.48, -0.26), (0.32, -0.26)], turning_radius=0.6)
+LONG_NOSE = Vehicle.from_footprint([(0.6, 0.2), (-0.1, 0.2), (-0.1, -0.2), (0.6, -0.2)], turning_radius=0.8)
+
+
+def departure_of(grid_map, vehicle, start, goal):
+    world = prepare(grid_map, vehicle)
+    problem = Problem(world, start=start, goal=goal, start_slack=0.1)
+    path = departures.find_departure(problem, world, "Start is occupied.", never).path
+    assert path is not None
+    return audit_path(path, replace(problem, goal=path.end))
+
+
+@needs_compiled
+@pytest.mark.parametrize(("vehicle", "start"), [
+    (SHORT_CAR, (9.4792, 6.614, 0.474)), (LONG_NOSE, (6.2777, 4.2529, 0.5147)), (LONG_NOSE, (8.0415, 8.9996, -3.0607))])
+def test_departures_are_audited_until_one_passes(vehicle, start):
+    assert departure_of(load_map("maze"), vehicle, start, (9.39, 10.81, 1.65)).ok
+
+
+@needs_compiled
+def test_a_departure_touches_nothing_once_it_was_clear():
+    assert departure_of(load_map("maze"), SHORT_CAR, (2.7312743, 4.2974122, -1.4062564), (9.39, 10.81, 1.65)).ok
+
+
+@needs_compiled
+@pytest.mark.parametrize("start", [(28.3102, 13.8538, -3.0853), (30.4072, 17.752, -0.0205)])
+def test_where_the_tail_has_little_room_a_slight_turn_leads_out(start):
+    assert departure_of(building("office", 1, 0).map, SHORT_CAR, start, GOAL).ok
 
 
 def test_facing_a_wall_there_is_no_way_out():
