@@ -20,7 +20,6 @@ cdef class PolygonChecker(CollisionChecker):
     cdef double rough_gap(self, Pose pose) noexcept nogil
     cdef bint is_clear(self, Pose pose, double wider, double ahead) noexcept nogil
     cdef double gap(self, Pose pose, double expected) noexcept nogil
-    cdef double speed(self, double radius, int turn) noexcept nogil
     cdef double straight_is_free(self, Pose pose, double length, double walked) noexcept nogil
     cdef double turn_is_free(self, Pose pose, double radius, int turn, double length, double walked) noexcept nogil
 

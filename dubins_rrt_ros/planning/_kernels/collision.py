@@ -5,12 +5,12 @@ A disc is free where the clearance is great enough. For a polygon the gap betwee
 that is the gap of the discs that cover the polygon; where they are too coarse, the polygon widened by some distance is checked
 against the obstacles exactly, and if it is clear, the gap is at least that distance.
 
-Guarantee of conservative advancement for a polygon. No point of the body moves faster than `speed`, in metres per metre along the
-curve, so neither does the gap change faster. A pose is free with a gap of at least `margin`; the next one is so far ahead that no
-point moves by more than `gap + margin / 2` until there. Between two such poses, with gaps g and g', the gap is at least
-(g + g' - (g + margin / 2)) / 2 >= margin / 4. On a straight arc the body covers the convex hull of its first and last place,
-which is checked as a whole. A polygon widened by e reaches no farther than sqrt(2) e beyond itself, so a curve that keeps a gap
-of sqrt(2) margin always passes.
+Guarantee of conservative advancement for a polygon. No point of the body moves faster than its fastest corner, in metres per
+metre along the curve, so neither does the gap change faster. A pose is free with a gap of at least `margin`; the next one is so
+far ahead that no point moves by more than `gap + margin / 2` until there. Between two such poses, with gaps g and g', the gap is
+at least (g + g' - (g + margin / 2)) / 2 >= margin / 4. On a straight arc the body covers the convex hull of its first and last
+place, which is checked as a whole. A polygon widened by e reaches no farther than sqrt(2) e beyond itself, so a curve that keeps
+a gap of sqrt(2) margin always passes.
 """
 
 import cython
@@ -25,14 +25,15 @@ if cython.compiled:
         arc_length,
         drive,
         drive_from,
+        fastest_point,
         turn_of,
     )
-    from cython.cimports.libc.math import cos, hypot, sin
+    from cython.cimports.libc.math import cos, sin
 else:
-    from math import cos, hypot, sin
+    from math import cos, sin
 
     from .clearance import Clearance
-    from .dubins import UNLIMITED, Curve, Pose, arc_length, drive, drive_from, turn_of
+    from .dubins import UNLIMITED, Curve, Pose, arc_length, drive, drive_from, fastest_point, turn_of
 
 #: Gap of a vehicle that touches an obstacle.
 CONTACT = cython.declare(cython.double, -UNLIMITED)
@@ -134,7 +135,7 @@ class PolygonChecker(CollisionChecker):
 
     def turn_is_free(self, pose, radius, turn, length, walked):
         """Check a turn."""
-        speed: cython.double = self.speed(radius, turn)
+        speed: cython.double = fastest_point(self.corners, radius, turn)
         sin_theta: cython.double = sin(pose.theta)
         cos_theta: cython.double = cos(pose.theta)
         s: cython.double = walked / speed
@@ -145,14 +146,6 @@ class PolygonChecker(CollisionChecker):
                 return -1
             s += (found + self.clearance.margin / 2) / speed
         return (s - length) * speed
-
-    def speed(self, radius, turn):
-        """Return the speed of the fastest point of the vehicle in an arc, in metres per metre along it."""
-        fastest: cython.double = 1
-        i: cython.Py_ssize_t
-        for i in range(self.corners.shape[0]):
-            fastest = max(fastest, hypot(1 - turn * self.corners[i, 1] / radius, self.corners[i, 0] / radius))
-        return fastest
 
     def gap(self, pose, expected):
         """Return a lower bound of the gap between vehicle and obstacles, at least `margin`; or CONTACT.

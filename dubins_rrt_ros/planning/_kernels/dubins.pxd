@@ -17,6 +17,7 @@ cdef int turn_of(int word, int arc) noexcept nogil
 cdef Curve single_arc(int turn, double length) noexcept nogil
 cdef Curve first_part(Curve curve, double length) noexcept nogil
 cdef Curve part_of(Curve curve, double begin, double end) noexcept nogil
+cdef double fastest_point(double[:, ::1] points, double radius, int turn) noexcept nogil
 cdef Pose drive(Pose pose, double radius, int turn, double s) noexcept nogil
 cdef Pose drive_from(Pose pose, double sin_theta, double cos_theta, double radius, int turn, double s) noexcept nogil
 cdef Pose end_of(Pose pose, double radius, Curve curve) noexcept nogil

@@ -20,9 +20,9 @@ middle arc, which is the longer one of the two that are possible, and q. Their a
 import cython
 
 if cython.compiled:
-    from cython.cimports.libc.math import asin, atan2, cos, fabs, fmod, remainder, sin, sqrt
+    from cython.cimports.libc.math import asin, atan2, cos, fabs, fmod, hypot, remainder, sin, sqrt
 else:
-    from math import asin, atan2, cos, fabs, fmod, remainder, sin, sqrt
+    from math import asin, atan2, cos, fabs, fmod, hypot, remainder, sin, sqrt
 
     # As dubins.pxd declares them. Values: a pose or a curve is never changed once it is made, since C copies and Python does not.
     Pose = cython.struct(x=cython.double, y=cython.double, theta=cython.double)
@@ -101,6 +101,19 @@ def part_of(curve, begin, end):
     return Curve(curve.word, max(0.0, min(end, curve.first) - max(begin, 0.0)),
                  max(0.0, min(end, second) - max(begin, curve.first)),
                  max(0.0, min(end, second + curve.third) - max(begin, second)))
+
+
+def fastest_point(points, radius, turn):
+    """Return the speed of the fastest point of a vehicle in an arc, in metres per metre along it.
+
+    Args:
+        points: (n, 2 or more): x and y of points in the vehicle's frame, whose reference point counts too [m].
+    """
+    fastest: cython.double = 1
+    i: cython.Py_ssize_t
+    for i in range(points.shape[0]):
+        fastest = max(fastest, hypot(1 - turn * points[i, 1] / radius, points[i, 0] / radius))
+    return fastest
 
 
 def drive(pose, radius, turn, s):

@@ -13,13 +13,13 @@ import numpy as np
 
 if cython.compiled:
     from cython.cimports.dubins_rrt_ros.planning._kernels.clearance import Clearance
-    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import Pose
-    from cython.cimports.libc.math import cos, hypot, sin, sqrt
+    from cython.cimports.dubins_rrt_ros.planning._kernels.dubins import Pose, fastest_point
+    from cython.cimports.libc.math import cos, sin, sqrt
 else:
-    from math import cos, hypot, sin, sqrt
+    from math import cos, sin, sqrt
 
     from .clearance import Clearance
-    from .dubins import Pose
+    from .dubins import Pose, fastest_point
 
 
 @cython.cclass
@@ -157,11 +157,7 @@ class FootprintRoom(Room):
 
     def speed(self, radius, turn):
         """Return the speed of the fastest point of the vehicle in an arc, in metres per metre along it."""
-        fastest: cython.double = 1
-        i: cython.Py_ssize_t
-        for i in range(self.outline.shape[0]):
-            fastest = max(fastest, hypot(1 - turn * self.outline[i, 1] / radius, self.outline[i, 0] / radius))
-        return fastest
+        return fastest_point(self.outline, radius, turn)
 
 
 @cython.cfunc
