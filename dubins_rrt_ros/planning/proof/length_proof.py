@@ -104,6 +104,9 @@ class LengthProof:
         """
         self._interrupted = interrupted
         try:
+            length = self.length
+            self._reopen(length)
+            self._raise_bound(length)  # at once, without a round for each of the lengths below
             while (limit := self._next_limit(gap)) is not None:
                 self._reopen(limit)
                 while self.bound < limit:
@@ -191,10 +194,14 @@ class LengthProof:
             portal.reopen(limit)
         self._is_stale = True
 
-    def _round(self, limit: float) -> bool:
-        """Bound all chains below a limit, and halve boxes of the cheapest ones; False where there is nothing more to gain."""
+    def _raise_bound(self, limit: float) -> None:
+        """Raise the bound to the cheapest chain, or to a limit where that costs more."""
         self._sweep(limit, backwards=False)
         self.bound = max(self.bound, min(limit, float(self._graph.portals[-1].up_to[0])))
+
+    def _round(self, limit: float) -> bool:
+        """Bound all chains below a limit, and halve boxes of the cheapest ones; False where there is nothing more to gain."""
+        self._raise_bound(limit)
         if self.bound >= limit:
             for portal in self._graph.portals[1:-1]:
                 portal.total = np.maximum(portal.total, limit)
