@@ -207,6 +207,13 @@ def test_the_plot_has_the_names():
     assert all(f"<!-- {name} -->" in text for name in ("yard", "pond", "a", "b"))
 
 
+def test_the_plot_of_short_runs_names_major_ticks_alone():
+    short = {"time_limit": 0.02, "total_s": 0.02}
+    report(write([run("yard", planner, 0, (0.002, 12.0), (0.01, 10.0), **short) for planner in "ab"]), "--plot", "runs.svg")
+    text = Path("runs.svg").read_text()
+    assert "<!-- 10 ms -->" in text and "times10" not in text
+
+
 def test_the_plot_takes_runs_of_any_kind():
     """None solved, the start the goal, and more planners than kinds of line."""
     many = [run("yard", f"planner {i}", 0, (0.1, 10 + i)) for i in range(24)]

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from dubins_rrt_ros.planning.pictures.drawing import DPI, FAILURE, GOAL, PATH, START
 
@@ -99,6 +100,8 @@ def _panels(problems: list[str], times: np.ndarray, planners: int) -> tuple[Figu
         axes.set(xscale="log", yscale="log")
         axes.set_xticks(list(TIMES), list(TIMES.values()))
         axes.set_yticks(list(COSTS), list(COSTS.values()))
+        for axis in (axes.xaxis, axes.yaxis):  # whose other marks have names too, over each other, where few decades are shown
+            axis.set_minor_formatter(NullFormatter())
         axes.set(xlim=(times[0], times[-1]), ylim=(0.85 * LEAST, MOST))  # the ticks beyond would widen them
         axes.set_title(problem, fontsize=12, weight="bold", loc="left")
         axes.tick_params(labelsize=10, which="both", labelbottom=True)
