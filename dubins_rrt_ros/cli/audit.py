@@ -43,7 +43,7 @@ class Verdict(NamedTuple):
         problem: the problem that the path should solve.
         length: the length of the path [m].
         audit: what the audit found.
-        not_judged: the fields of a plan's document that nothing was compared with.
+        not_judged: the fields of the document that nothing was compared with.
     """
 
     problem: Problem
@@ -146,7 +146,9 @@ def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -
     poses = _poses(document)
     ends = {"start": poses[0], "goal": poses[-1]} | _ends(arguments)
     problem = Problem(world_map, Vehicle(**given_options(arguments, Vehicle)), **ends, **given_options(arguments, Problem))
-    return Verdict(problem, driven_length(poses), audit_poses(poses, problem, arguments.tolerance_xy, arguments.tolerance_yaw))
+    others = tuple(name for name in document if name != "poses") if isinstance(document, Mapping) else ()
+    found = audit_poses(poses, problem, arguments.tolerance_xy, arguments.tolerance_yaw)
+    return Verdict(problem, driven_length(poses), found, others)
 
 
 def _ends(arguments: argparse.Namespace) -> dict[str, Any]:

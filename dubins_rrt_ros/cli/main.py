@@ -83,5 +83,6 @@ def _run_command(arguments: "Namespace") -> int:
 
 
 def _refused(name: str, reason: str) -> int:
-    print(f"{name}: error: {reason}", file=sys.stderr)
+    from dubins_rrt_ros.planning.text import one_line  # a reason may quote a file
+    print(f"{name}: error: {one_line(reason)}", file=sys.stderr)
     return WRONG_USAGE

@@ -142,7 +142,7 @@ class Maps:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings for a person about how the newest map's file was understood."""
-        return self.map.warnings if isinstance(self.map, GridMap) else ()
+        return self.map.warnings if self.map else ()
 
     def take(self, world_map: Map, grid: GridMap, by_topic: bool = False) -> None:
         """Plan on this map, which looks like this grid, from now on."""

@@ -142,8 +142,8 @@ class Parameters:
     def overridden(self) -> list[str]:
         """Return a warning, of one sentence, for each value given at start-up in whose place another one is used."""
         given = getattr(self._node, "_parameter_overrides", {})
-        set_ones = [name for name, parameter in given.items() if parameter.value]
-        return [f"{name} has no effect, as {by} takes its place" for name, by in overridden(set_ones).items()]
+        values = {name: parameter.value for name, parameter in given.items()}
+        return [f"{name} has no effect, as {by} takes its place" for name, by in overridden(values).items()]
 
     def pending(self, changes: Iterable) -> list:
         """Return what remains to be set of changes, given as rclpy's Parameters.

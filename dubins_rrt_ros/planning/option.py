@@ -149,6 +149,31 @@ def plain_number(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
 
 
+def plain_float(value: Any) -> float:
+    """Return a number of a text in which nothing but a number is written, or a number, as a float.
+
+    Raises:
+        ValueError, TypeError, OverflowError: it is none, as are Booleans, and digits with underscores between them.
+    """
+    if isinstance(value, bool | np.bool_) or (isinstance(value, str) and "_" in value):
+        raise ValueError
+    return float(value)
+
+
+def own_floats(numbers: Any) -> tuple[float, ...]:
+    """Return a sequence of numbers as floats; texts and Booleans are no numbers, nor are sets and mappings in an order.
+
+    Raises:
+        ValueError, TypeError, OverflowError: it is none.
+    """
+    if isinstance(numbers, str | bytes | dict | set | frozenset):
+        raise TypeError
+    given = tuple(numbers)
+    if any(isinstance(number, str | bytes) for number in given):
+        raise TypeError
+    return tuple(map(plain_float, given))
+
+
 def is_number(value: Any) -> bool:
     """Return True for a finite float, and for an integer that a float can hold; true and false are no numbers."""
     value = plain_number(value)

@@ -26,7 +26,7 @@ from .search.known_path import KnownPath
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
 from .search.tree import Tree
-from .settings import Settings
+from .settings import Settings, demand_settings
 from .work import Work, WorkDone
 from .world import World, problem_with_costs, world_of
 
@@ -69,7 +69,7 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
     Raises:
         HookError: `is_free` of the problem or `sampler` of the settings raised an exception, or gave what it should not.
     """
-    return _Call(demand_problem(problem), (settings or Settings()).with_seed(), cancel or never, on_progress or _ignore,
+    return _Call(demand_problem(problem), demand_settings(settings).with_seed(), cancel or never, on_progress or _ignore,
                  report_samples, seed_path).answer()
 
 

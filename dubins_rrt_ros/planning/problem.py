@@ -10,7 +10,7 @@ from .errors import PlanningError
 from .hooks import IsFree, check_function
 from .maps.frame import LARGEST_YAW, DoubtfulYaw, doubt_about_yaw
 from .maps.model import GridMap, Map, PolygonMap
-from .option import OptionError, convert_options, documented, option
+from .option import OptionError, convert_options, documented, option, own_floats
 from .text import quoted
 from .vehicle import Vehicle
 
@@ -138,7 +138,7 @@ def checked_pose(name: str, pose: Sequence[float]) -> Pose:
         InvalidPose: it has not three finite numbers, or too large a yaw; `name` is in the message.
     """
     try:
-        numbers = () if isinstance(pose, str | bytes | dict | set) else tuple(map(float, pose))
+        numbers = own_floats(pose)
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
@@ -160,6 +160,18 @@ def checked_waypoint(name: str, waypoint: Any) -> Waypoint:
         x, y, _ = checked_pose(name, (*numbers[:2], 0.0))
         return x, y, None
     return checked_pose(name, waypoint)
+
+
+def checked_waypoints(waypoints: Any) -> tuple[Waypoint, ...]:
+    """Return waypoints, each named by its number from 1 on where it is none.
+
+    Raises:
+        InvalidPose: as `checked_pose` does.
+        TypeError: they are no list.
+    """
+    if not isinstance(waypoints, Iterable):
+        raise TypeError(f"the waypoints are {quoted(waypoints)}; give a list of poses")
+    return tuple(checked_waypoint(f"waypoint {number}", waypoint) for number, waypoint in enumerate(waypoints, 1))
 
 
 def demand_problem(problem: object) -> Problem:

@@ -6,6 +6,7 @@ from typing import Any
 
 from .hooks import Sampler, check_function
 from .option import OptionError, convert_options, documented, option
+from .text import quoted
 from .vehicle import Vehicle
 from .work import UNLIMITED_WORK, WorkDone
 
@@ -109,3 +110,16 @@ class Settings:
             others: options by name, which take precedence.
         """
         return cls(**{**PAPER, **others})
+
+
+def demand_settings(settings: object) -> Settings:
+    """Return settings, the defaults for None.
+
+    Raises:
+        TypeError: they are none.
+    """
+    if settings is None:
+        return Settings()
+    if not isinstance(settings, Settings):
+        raise TypeError(f"the settings are {quoted(settings)}; give Settings, such as Settings(samples=3000)")
+    return settings

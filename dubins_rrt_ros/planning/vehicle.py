@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -27,9 +27,10 @@ _CORNER = re.compile(rf"\[{_NUMBER},{_NUMBER}(?:,\s*)?\]", re.ASCII)
 _OUTLINE = re.compile(rf"\s*\[\s*(?:{_CORNER.pattern}\s*,\s*)*(?:{_CORNER.pattern}\s*)?\]\s*", re.ASCII)
 
 
-def overridden(given: Collection[str]) -> dict[str, str]:
+def overridden(given: Mapping[str, Any]) -> dict[str, str]:
     """Return which of the options that were given have no effect, each with the given one that takes its place."""
-    return {name: by for name, by in (("robot_radius", "footprint"), ("turning_radius", "wheelbase")) if {name, by} <= set(given)}
+    pairs = ("robot_radius", "footprint"), ("turning_radius", "wheelbase")
+    return {name: by for name, by in pairs if name in given and given.get(by)}
 
 
 def _read_footprint(value: Any) -> Footprint:

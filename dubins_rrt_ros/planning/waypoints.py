@@ -24,7 +24,7 @@ from .deadline import Deadline, OutOfTime, never
 from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
 from .diagnosis.components import are_separated
 from .planner import AUDIT_RESERVE, SAME, plan
-from .problem import Pose, Problem, Waypoint, checked_waypoint, demand_problem
+from .problem import Pose, Problem, Waypoint, checked_waypoints, demand_problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective
 from .search.cost_to_go import CostToGo
@@ -34,7 +34,7 @@ from .search.known_path import KnownPath
 from .search.legs import Leg, cheapest_chain, first_impassable
 from .search.smoothing import smooth
 from .search.tree import Tree
-from .settings import MIN_PLANNING_TIME, Settings
+from .settings import MIN_PLANNING_TIME, Settings, demand_settings
 from .stops import HEADINGS, Stop, last_place, least_length, legs_along, passing_indices, stops_of
 from .work import Work
 from .world import problem_with_costs, world_of
@@ -70,8 +70,8 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
     Raises:
         HookError, InvalidPose: a function of the user's is wrong, as `plan` says; a waypoint is none.
     """
-    waypoints = tuple(checked_waypoint(f"waypoint {number}", pose) for number, pose in enumerate(poses, 1))
-    settings = (settings or Settings()).with_seed()
+    waypoints = checked_waypoints(poses)
+    settings = demand_settings(settings).with_seed()
     call = _Call(demand_problem(problem), waypoints, settings, cancel or never, on_progress, seed_path)
     answer = call.answer()
     call.world.field.raise_test_error()

@@ -198,7 +198,7 @@ def test_poses_in_csv_are_judged(document, capsys):
         status, out, _ = run("path.csv", "hall.wkt", *DISC, capsys=capsys)
         assert status == 0 and f"length {document['length']:.3f} m" in out
     Path("path.csv").write_text("x,y,theta\n1,2,three\n")
-    assert "path.csv is no JSON file" in refusal("path.csv", "hall.wkt", *DISC, capsys=capsys)
+    assert "path.csv: line 2 is '1,2,three'" in refusal("path.csv", "hall.wkt", *DISC, capsys=capsys)
 
 
 def test_an_echoed_path_message_is_judged(capsys):

@@ -168,8 +168,8 @@ def test_rows_are_named_and_problems_chosen():
     ([entry(turning_radius="1")], "turning_radius is '1'"), ([entry(turning_radius=0)], "turning_radius is 0"),
     ([entry(robot_radius=-1)], "robot_radius is -1"), ([entry(robot_radius=10**400)], "robot_radius is 1000"),
     ([entry(goal=[10**400, 0, 0])], "The goal pose is [1000"), ([entry(map="m" * 5000)], "there is no map file"),
-    ([entry(name="two\nlines", map="gone.wkt")], "problem 1, two lines: there is no map file"),
-    ([entry(name="two\nlines")] * 2, "several problems have the name two lines")])
+    ([entry(name="two\nlines")], "problem 1: its name is 'two\\nlines'; give one of 200 printable characters at most"),
+    ([entry(map="two\nlines.wkt")], "problem 1, hall: there is no map file set/two lines.wkt")])
 def test_a_file_of_problems_that_is_none_takes_one_line(document, says, capsys):
     Path("set/problems.json").write_text(json.dumps(document))
     line = refusal("set/problems.json", "--out", "runs.jsonl", capsys=capsys)

@@ -38,7 +38,7 @@ NO_FILES = ["no.pgm", ".", '"a\\0b.pgm"', '"\\ud800.pgm"', '"' + 300 * "n" + '"'
 
 @pytest.mark.parametrize("field, values", [
     ("image", [None, "", "[a]", "m.yaml", *NO_FILES]),
-    ("resolution", [None, "", "0", "-0.05", ".nan", "nan", "inf", "1e999", "five", "[0.05]"]),
+    ("resolution", [None, "", "0", "-0.05", ".nan", "nan", "inf", "1e999", "five", "1_0", "[0.05]"]),
     ("origin", [None, "", "0", "000", "[0, 0]", "[0, 0, 0, 0]", "[0, nan, 0]",
                 "[0, 0, x]", "[0, 0, 1e300]", "[[0], 0, 0]", "{x: 1}"]),
     ("negate", [None, "2", "maybe", "[]", ""]),

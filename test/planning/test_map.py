@@ -10,11 +10,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning import Problem, Settings, Vehicle, audit_path, plan, plan_through, prepare
+from dubins_rrt_ros.planning import InvalidPose, Problem, Settings, Vehicle, audit_path, plan, plan_through, prepare
 from dubins_rrt_ros.planning.maps.cells import FREE, OCCUPIED, DoubtfulGrid
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
-from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, rasterise
+from dubins_rrt_ros.planning.maps.model import DoubtfulObstacles, GridMap, PolygonMap, rasterise
 
 coordinates = st.floats(-1e3, 1e3)
 
@@ -89,6 +89,43 @@ def test_a_truth_value_is_no_resolution():
         GridMap([[0, 100]], True)
 
 
+@pytest.mark.parametrize("pose", [
+    ("1", "1", "0"), "110", (True, 1, 0), (np.True_, 1, 0), {0.0, 1.0, 2.0}, {1: 1, 2: 1, 0: 0}, b"110"],
+                         ids=["texts", "text", "truth value", "numpy truth value", "set", "mapping", "bytes"])
+def test_texts_truth_values_and_what_has_no_order_are_no_pose(pose):
+    grid = GridMap(np.zeros((40, 40)), 0.1)
+    with pytest.raises(InvalidPose, match="The goal pose is .*; give three finite numbers"):
+        Problem(grid, Vehicle(), (1, 1, 0), pose)
+    with pytest.raises(MapMetadataError, match="origin is .*; give x and y, finite, in metres"):
+        GridMap(np.zeros((40, 40)), 0.1, pose)
+
+
+def test_a_text_is_no_resolution():
+    with pytest.raises(MapMetadataError, match="resolution is '0.1'"):
+        GridMap([[0, 100]], "0.1")
+
+
+@pytest.mark.parametrize("corners", [[("0", "0"), ("5", "0"), ("5", "5")], [(False, False), (True, False), (True, True)]],
+                         ids=["texts", "truth values"])
+def test_corners_are_numbers(corners):
+    with pytest.raises(MapError, match="the bounds polygon is .*; give a polygon"):
+        PolygonMap.of(corners)
+    with pytest.raises(MapError, match="obstacle 1 is .*; give a polygon"):
+        PolygonMap.of(shapely.box(-9, -9, 9, 9), [corners])
+
+
+def test_obstacles_outside_of_the_bounds_are_told():
+    """As where x and y are swapped in them, or the unit is another."""
+    with pytest.warns(DoubtfulObstacles, match=r"yard: 1 of 2 obstacles lie outside .*: obstacle 2, which begins at \(40, 4\)"):
+        yard = PolygonMap.of(shapely.box(0, 0, 30, 50), [shapely.box(3, 39, 5, 41), shapely.box(40, 4, 42, 5)], name="yard")
+    assert yard.free.area == 1500 - 4
+
+
+def test_a_share_next_to_a_whole_number_is_quoted_with_all_digits():
+    with pytest.raises(MapError, match="a cell holds 0.999999999; give whole percent"):
+        GridMap([[0.999999999, 0.0]], 1.0)
+
+
 def test_a_grid_of_small_numbers_is_taken_with_a_warning():
     with pytest.warns(DoubtfulGrid, match="no value above 2, which stands for 2 % and is free"):
         GridMap([[0, 1, 2]], 1.0)
@@ -122,6 +159,9 @@ def test_what_a_function_does_not_take_is_named():
     problem = Problem(grid, Vehicle(), (1, 1, 0), (3, 3, 0))
     for call, says in ((lambda: plan(Settings(), problem), "the problem is Settings"),
                        (lambda: plan(None), "the problem is None"),
+                       (lambda: plan(problem, {"samples": 3}), "the settings are {'samples': 3}; give Settings"),
+                       (lambda: plan_through(problem, [], 3), "the settings are 3; give Settings"),
+                       (lambda: plan_through(problem, None), "the waypoints are None; give a list of poses"),
                        (lambda: plan_through(grid, [(1, 2)]), "the problem is GridMap"),
                        (lambda: prepare(np.zeros((4, 4)), Vehicle()), "give a GridMap or a PolygonMap; load_map reads files"),
                        (lambda: prepare(grid, (1.0, 0.2)), r"the vehicle is \(1.0, 0.2\); give a Vehicle"),

@@ -145,11 +145,11 @@ def test_unknown_space_that_is_free_by_its_threshold_is_told(tmp_path, mode):
 
 
 @pytest.mark.parametrize("changes, doubt", [
-    ({"origin": "[0, 0, 45]"}, "m.yaml: the origin has the yaw 45 rad; did you mean 0.7854?"),
-    ({"mod": "scale"}, "m.yaml: the field 'mod' is passed over; did you mean mode?"),
-    ({"Resolution": "0.2"}, "m.yaml: the field 'Resolution' is passed over; did you mean resolution?"),
-    ({"occupied_threshold": "0.5"}, "m.yaml: the field 'occupied_threshold' is passed over; did you mean occupied_thresh?"),
-    ({"unknown_grey": "205"}, "m.yaml: unknown_grey is no field of map files and is passed over; give it as a parameter, or by "
+    ({"origin": "[0, 0, 45]"}, "the origin has the yaw 45 rad; did you mean 0.7854?"),
+    ({"mod": "scale"}, "the field 'mod' is passed over; did you mean mode?"),
+    ({"Resolution": "0.2"}, "the field 'Resolution' is passed over; did you mean resolution?"),
+    ({"occupied_threshold": "0.5"}, "the field 'occupied_threshold' is passed over; did you mean occupied_thresh?"),
+    ({"unknown_grey": "205"}, "unknown_grey is no field of map files and is passed over; give it as a parameter, or by "
      "--unknown-grey"),
     ({"frame_id": "odom"}, None)], ids=lambda value: None if isinstance(value, str | None) else next(iter(value)))
 def test_what_is_likely_a_slip_in_a_map_file_is_told(tmp_path, changes, doubt):
@@ -158,9 +158,17 @@ def test_what_is_likely_a_slip_in_a_map_file_is_told(tmp_path, changes, doubt):
 
 @pytest.mark.parametrize("rows, changes", [
     ([[205, 0, 254]], {}), ([[204, 0, 254]], {"free_thresh": "0.25"}), ([[205, 100]], {"mode": "raw", "free_thresh": "0.25"}),
-    ([[205, 0]], {"negate": "1", "free_thresh": "0.25"})])
+    ([[205, 0]], {"negate": "1", "free_thresh": "0.25"}), ([[50, 255]], {"negate": "1"})])
 def test_unknown_space_that_is_not_free_is_not_told(tmp_path, rows, changes):
     assert load_map(write_grid(tmp_path, rows, **changes)).warnings == ()
+
+
+def test_the_unknown_space_of_an_inverted_picture_that_is_free_is_told(tmp_path):
+    path = write_grid(tmp_path, [[50, 255, 0, 0]], negate="1", free_thresh="0.25")
+    warning, = load_map(path).warnings
+    for part in ("25.00%", "grey 50", "set free_thresh: 0.196", "--unknown-grey 50"):
+        assert part in warning
+    assert load_map(path, unknown_grey=50).data.tolist() == [[-1, 100, 0, 0]]
 
 
 def test_the_grey_of_unknown_space_holds_in_all_modes(tmp_path):

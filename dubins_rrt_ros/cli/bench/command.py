@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from dubins_rrt_ros.planning import Settings
@@ -119,7 +118,7 @@ def _check_outputs(given: dict[str, Any]) -> None:
     for plot in plots:
         check_drawing(plot)
     sources = given.get("report", [given["file"]] if "file" in given else [])
-    if out and Path(out).resolve() in [Path(source).resolve() for source in sources]:
+    if out and os.path.realpath(out) in map(os.path.realpath, sources):
         raise UsageError(f"--out {out} would overwrite what is read; name another file")
 
 

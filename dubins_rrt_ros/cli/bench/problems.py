@@ -21,6 +21,9 @@ _IN_PLACE_OF = {"turning_radius": "wheelbase", "robot_radius": "footprint"}
 #: Keys that are notes, as all that begin with an underscore.
 NOTES = ("set", "check_step")
 
+#: Maximum length of a problem's name, which is part of lines and tables [characters].
+LONGEST_NAME = 200
+
 _Options = tuple[tuple[str, Any], ...]
 
 
@@ -103,6 +106,8 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
     for key in ("name", "map"):
         if not (isinstance(entry[key], str) and entry[key]):
             raise UsageError(f"{where}: its {key} is {quoted(entry[key])}; give a text")
+    if not entry["name"].isprintable() or len(entry["name"]) > LONGEST_NAME:
+        raise UsageError(f"{where}: its name is {quoted(entry['name'])}; give one of {LONGEST_NAME} printable characters at most")
     where, map_file = f"{where}, {entry['name']}", folder / entry["map"]
     if not os.path.isfile(map_file):  # pathlib's is_file() raises for a name that is too long
         raise UsageError(one_line(f"{where}: there is no map file {map_file}; its name is relative to the file of problems"))

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -33,11 +34,11 @@ def check_folder(*files: str | None, sources: Iterable[str] = ()) -> None:
     Raises:
         UsageError: one of the files has no folder, is one, is named twice, or is a source.
     """
-    read, written = {Path(source).resolve() for source in sources}, set()
+    read, written = {_real(source) for source in sources}, set()
     for file in files:
         if not file or file == STDOUT:
             continue
-        path = Path(file).resolve()
+        path = _real(file)
         if not path.parent.is_dir():
             raise UsageError(f"there is no folder {Path(file).parent} to write {path.name} to; make it first")
         if path.is_dir():
@@ -47,6 +48,11 @@ def check_folder(*files: str | None, sources: Iterable[str] = ()) -> None:
         if path in read:
             raise UsageError(f"{file} is read, and would be written over; name another file")
         written.add(path)
+
+
+def _real(file: str) -> Path:
+    """Return a path with all links followed, but for those that lead back to themselves, which `Path.resolve` raises for."""
+    return Path(os.path.realpath(file))
 
 
 def check_drawing(file: str | None, endings: tuple[str, ...] = DRAWINGS) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
 from typing import Any, NoReturn
@@ -41,9 +42,13 @@ class Parser(argparse.ArgumentParser):
         """Parse as argparse does, but leave nothing over, and name an unknown flag before those that are missing for it."""
         args = sys.argv[1:] if args is None else args
         own = takewhile(_is_flag, args) if self._subparsers else filter(_is_flag, args)  # after a command come its flags
-        for flag in (word.split("=")[0] for word in own):
+        given = Counter(word.split("=")[0] for word in own)
+        for flag in given:
             if flag not in self._option_string_actions:
                 self.error(f"there is no flag {flag}{near_miss(flag, self._option_string_actions)}")
+        for flag, times in given.items():
+            if times > 1 and not isinstance(self._option_string_actions[flag], argparse._AppendAction):
+                print(f"{self.prog}: warning: {flag} is given {times} times; the last one counts", file=sys.stderr)
         parsed, extras = super().parse_known_args(args, namespace)
         if extras:
             self.error(f"{extras[0].strip()} is one argument too many")

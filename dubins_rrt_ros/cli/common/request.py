@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning import GridMap, Map, MapNotFound, Problem, Settings, load_map
+from dubins_rrt_ros.planning import GridMap, InvalidPose, Map, MapNotFound, OptionError, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
 from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
 from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
@@ -96,7 +96,9 @@ def read_map(name: str, **options: Any) -> tuple[Map, float]:
     begin = time.perf_counter()
     loaded = load_map(find_map_or_suggest(name), **options)
     took = time.perf_counter() - begin
-    for warning in loaded.warnings if isinstance(loaded, GridMap) else ():
+    no_pixels = () if isinstance(loaded, GridMap) or options.get("unknown_grey", -1) < 0 else (
+        "--unknown-grey has no effect on polygons",)
+    for warning in (*loaded.warnings, *no_pixels):
         print(f"dubins_rrt: warning: {one_line(name)}: {warning}", file=sys.stderr)
     return loaded, took
 
@@ -113,7 +115,7 @@ def read_replay(file: str, **options: Any) -> LoadedRequest:
     try:
         problem, settings = read_request(document, world_map)
         path, waypoints = read_path(document), read_waypoints(document)
-    except PlanFileError as error:
+    except (PlanFileError, OptionError, InvalidPose) as error:
         raise PlanFileError(f"{file}: {error}") from error
     return LoadedRequest(document["map"], problem, settings, load_time, file, path, waypoints)
 

@@ -47,7 +47,7 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
         costs: the figures of its cost by the document's settings; None where they are not judged.
     """
     for name, expected in _SAID_OF_A_PATH.items():
-        if name in document and document[name] != expected:
+        if name in document and (document[name] != expected or isinstance(document[name], bool)):
             yield f"{name} is {quoted(document[name])}, and of a path it is {expected!r}"
     settings = document.get("settings")
     for name in _SETTINGS:

@@ -66,11 +66,12 @@ def cells_of(picture: Picture, rules: Rules, unknown_grey: int) -> tuple[np.ndar
 
 
 def _unknown_taken_as_free(picture: Picture, rules: Rules, cells: np.ndarray) -> Iterator[str]:
-    share = 0.0 if rules.mode == "raw" else float(np.mean((picture.grey[::-1] == UNKNOWN_GREY) & (cells == FREE)))
+    grey = 255 - UNKNOWN_GREY if rules.negate else UNKNOWN_GREY
+    share = 0.0 if rules.mode == "raw" else float(np.mean((picture.grey[::-1] == grey) & (cells == FREE)))
     if share > 0:
-        yield (f"{share:.2%} of the cells have the grey {UNKNOWN_GREY}, as unknown space has it, and are free by free_thresh: "
+        yield (f"{share:.2%} of the cells have the grey {grey}, as unknown space has it, and are free by free_thresh: "
                f"{rules.free_thresh:g}, as for map_server; if they are unknown, set free_thresh: {Rules().free_thresh:g}, or "
-               f"take that grey as unknown, by unknown_grey = {UNKNOWN_GREY} (--unknown-grey {UNKNOWN_GREY})")
+               f"take that grey as unknown, by unknown_grey = {grey} (--unknown-grey {grey})")
 
 
 def _transparency(picture: Picture, rules: Rules) -> Iterator[str]:

@@ -55,8 +55,8 @@ def _percentages(data: np.ndarray, name: str) -> np.ndarray:
     cells = data.astype(np.int8)
     fractions = data[cells != data]
     if fractions.size:
-        raise MapError(f"{name}: a cell holds {fractions[0]:g}; give whole percent from 0 (free) to 100 (occupied), such as "
-                       "100 * data rounded where they are probabilities")
+        raise MapError(f"{name}: a cell holds {fractions[0].item()!r}; give whole percent from 0 (free) to 100 (occupied), such "
+                       "as 100 * data rounded where they are probabilities")
     return cells
 
 

@@ -33,7 +33,7 @@ def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS
         unknown_grey: the brightness of pixels that are unknown cells, whatever the thresholds say, such as 205; -1 for none.
 
     Returns:
-        A map in metres; its name is the file's. Of a grid, `warnings` has what a person should know of how it was understood.
+        A map in metres; its name is the file's. Its `warnings` have what a person should know of how it was understood.
 
     Raises:
         MapNotFound: the file, or the image that it names, is not there, cannot be opened or is outside `map_directory`.

@@ -94,6 +94,18 @@ def polygons_of(shapes: shapely.Geometry | Iterable[Shape], label: str) -> list[
     return [polygon_of(shape, f"{label} {number}") for number, shape in enumerate(given, 1)]
 
 
+def doubt_about_outside(bounds: shapely.Geometry, obstacles: Sequence[shapely.Geometry], labels: Sequence[str]) -> str:
+    """Return how many obstacles lie outside of the bounds, in words; "" where none does."""
+    x0, y0, x1, y1 = shapely.bounds(bounds)
+    left, low, right, top = shapely.bounds(obstacles).reshape(-1, 4).T
+    outside = np.flatnonzero((left > x1) | (right < x0) | (low > y1) | (top < y0))
+    if not len(outside):
+        return ""
+    first = int(outside[0])
+    return (f"{len(outside)} of {len(obstacles)} obstacles lie outside of the bounds and have no effect: {labels[first]}, which "
+            f"begins at ({left[first]:g}, {low[first]:g}), is the first; give all in one frame, x before y, in metres")
+
+
 def valid(geometry: shapely.Geometry, label: str) -> shapely.Geometry:
     """Return a geometry that is valid.
 
@@ -120,7 +132,7 @@ def check_size(geometry: shapely.Geometry, label: str) -> None:
 def _corners(shape: Any, label: str) -> np.ndarray:
     """Return (n, 2) corners [m]."""
     try:
-        corners = np.array(shape, dtype=float)
+        corners = np.array(shape, dtype=float) if np.asarray(shape).dtype.kind in "iuf" else np.empty(0)
     except (TypeError, ValueError, OverflowError):
         corners = np.empty(0)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from ..option import plain_float
 from ..text import quoted
 from .brightness import FREE_GREY, MODES, OCCUPIED_GREY, UNKNOWN_GREY, Rules, cells_of
 from .errors import MapError, MapMetadataError
@@ -82,8 +83,7 @@ def load_grid(path: Path, options: ReadOptions) -> GridMap:
     except MapError as error:
         raise type(error)(f"image {image!r} {error}") from None
     cells, warnings = cells_of(picture, Rules(mode, negate, occupied, free), options.unknown_grey)
-    doubts = [f"{path.name}: {doubt}" for doubt in _doubts(fields, origin[2])]
-    return GridMap(cells, resolution, origin, path.name, percent=True, warnings=(*doubts, *warnings))
+    return GridMap(cells, resolution, origin, path.name, percent=True, warnings=(*_doubts(fields, origin[2]), *warnings))
 
 
 def _doubts(fields: dict[str, Any], yaw: float) -> Iterator[str]:
@@ -151,7 +151,7 @@ def _text(value: Any) -> str:
 
 
 def _finite(value: Any) -> float:
-    number = float(value)
+    number = plain_float(value)
     if not math.isfinite(number):
         raise ValueError
     return number

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import shapely
 
+from ..option import own_floats, plain_float
 from ..pictures import Plottable, check_matplotlib
 from ..text import quoted
 from .cells import FREE, OCCUPIED, check_meaning, checked_cells
 from .errors import MapError, MapMetadataError
 from .frame import LARGEST_YAW, DoubtfulYaw, Frame, doubt_about_yaw
-from .free_space import MIN_SIDE, Shape, check_size, free_space, polygon_of, polygons_of
+from .free_space import MIN_SIDE, Shape, check_size, doubt_about_outside, free_space, polygon_of, polygons_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
 
 
 class Thresholds(NamedTuple):
@@ -64,6 +64,10 @@ DEFAULT_THRESHOLDS = Thresholds()
 
 #: Smallest side of a cell and largest coordinate [m] that leave rounding far below what the planner guarantees.
 FINEST, FARTHEST = 1e-4, 1e8
+
+
+class DoubtfulObstacles(UserWarning):
+    """A warning: obstacles outside of the bounds, which have no effect, as in another frame or unit."""
 
 
 class _PlottableMap(Plottable):
@@ -212,6 +216,7 @@ class PolygonMap(_PlottableMap):
     Attributes:
         free: the free space, a valid shapely Polygon or MultiPolygon in metres; holes and the outside are obstacles.
         name: where it came from, for messages; by keyword alone.
+        warnings: what a person should know of how the file was understood, one line each.
 
     Args:
         known_valid: True if the free space is known to be valid, which takes seconds to find out for 100,000 vertices.
@@ -219,6 +224,7 @@ class PolygonMap(_PlottableMap):
 
     free: shapely.Geometry
     name: str = field(default="polygons", kw_only=True)
+    warnings: tuple[str, ...] = field(default=(), kw_only=True)
     known_valid: InitVar[bool] = field(default=False, kw_only=True)
 
     #: The costs of cells: polygons have none.
@@ -260,8 +266,11 @@ class PolygonMap(_PlottableMap):
         Raises:
             MapError: one of them is no valid polygon, or the obstacles leave no free space.
         """
-        free = free_space(polygon_of(bounds, "the bounds polygon"), polygons_of(obstacles, "obstacle"), "polygons")
-        return cls(free, name=name, known_valid=True)
+        outer, shapes = polygon_of(bounds, "the bounds polygon"), polygons_of(obstacles, "obstacle")
+        doubt = doubt_about_outside(outer, shapes, [f"obstacle {number}" for number in range(1, len(shapes) + 1)])
+        if doubt:
+            python_warnings.warn(f"{name}: {doubt}", DoubtfulObstacles, stacklevel=2)
+        return cls(free_space(outer, shapes, "polygons"), name=name, known_valid=True)
 
     def corners(self) -> np.ndarray:
         """(4, 2) corners of the bounding rectangle, counter-clockwise [m]; read-only."""
@@ -278,7 +287,8 @@ class PolygonMap(_PlottableMap):
         return _digest(shapely.to_wkb(self.free, byte_order=1))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(PolygonMap, name=self.name, known_valid=True), (self.free,)  # so that they are prepared for threads again
+        # Made anew, so that they are prepared for threads again.
+        return partial(PolygonMap, name=self.name, warnings=self.warnings, known_valid=True), (self.free,)
 
 
 Map = GridMap | PolygonMap
@@ -291,7 +301,7 @@ def _check_name(name: Any) -> None:
 
 def _checked_resolution(resolution: Any, name: str) -> float:
     try:
-        number = math.nan if isinstance(resolution, bool | np.bool_) else float(resolution)
+        number = math.nan if isinstance(resolution, str | bytes) else plain_float(resolution)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not 0 < number < math.inf:
@@ -301,7 +311,7 @@ def _checked_resolution(resolution: Any, name: str) -> float:
 
 def _checked_origin(origin: Any, name: str) -> tuple[float, float, float]:
     try:
-        x, y, yaw = map(float, origin)
+        x, y, yaw = own_floats(origin)
     except (TypeError, ValueError, OverflowError):
         x = y = yaw = math.nan
     if not (math.isfinite(x) and math.isfinite(y) and abs(yaw) <= LARGEST_YAW):

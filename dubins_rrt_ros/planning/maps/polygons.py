@@ -10,13 +10,15 @@ import shapely
 
 from ..text import quoted
 from .errors import MapError
-from .free_space import MAX_COORDINATE, check_size, free_space, valid
+from .free_space import MAX_COORDINATE, check_size, doubt_about_outside, free_space, valid
 from .json import RepeatedKey, load_unique
 from .model import PolygonMap
 
 #: Size of a map below which its coordinates may be degrees, and how many times further from (0, 0) it is then, at least.
 _SIZE_IN_DEGREES, _TIMES_FURTHER = 0.5, 20
 _POLYGONS = ("Polygon", "MultiPolygon")
+#: The names of coordinate reference systems in degrees that drawing programs write.
+_CRS_IN_DEGREES = re.compile(r"\b(CRS:?84|EPSG:.*\b4326)\b", re.IGNORECASE)
 
 
 def parse_geojson(text: str, name: str) -> PolygonMap:
@@ -24,14 +26,15 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
 
     The one feature with the property `"role": "bounds"` is the bounds, every other an obstacle; a hole of an obstacle
     is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored. Coordinates
-    that look like degrees are refused.
+    that look like degrees are refused; obstacles outside of the bounds and a crs in degrees are doubted.
 
     Raises:
         MapError: the text is no such collection, or a ring is not valid; names the feature and the ring.
     """
     bounds: list[tuple[str, shapely.Geometry]] = []
     obstacles: list[tuple[str, shapely.Geometry]] = []
-    for number, feature in enumerate(_features(_parse_json(text)), 1):
+    document = _parse_json(text)
+    for number, feature in enumerate(_features(document), 1):
         label = _label(number, feature)
         geometry = _geometry(feature, label)
         is_bounds = _properties(feature).get("role") == "bounds"
@@ -40,8 +43,10 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
         found = ", ".join(label for label, _ in bounds[:5]) or "none"
         raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
     _refuse_degrees(bounds[0][1], bounds[0][0])
-    return PolygonMap(free_space(bounds[0][1], [geometry for _, geometry in obstacles], "features"), name=name,
-                      known_valid=True)
+    labels, shapes = [label for label, _ in obstacles], [geometry for _, geometry in obstacles]
+    doubts = doubt_about_outside(bounds[0][1], shapes, labels), _doubt_about_crs(document)
+    return PolygonMap(free_space(bounds[0][1], shapes, "features"), name=name, known_valid=True,
+                      warnings=tuple(filter(None, doubts)))
 
 
 def parse_wkt(text: str, name: str) -> PolygonMap:
@@ -82,6 +87,16 @@ def _refuse_degrees(bounds: shapely.Geometry, label: str) -> None:
     if on_globe and size < _SIZE_IN_DEGREES and math.hypot(west, south) > _TIMES_FURTHER * size:
         raise MapError(f"{label} is {east - west:.2g} x {north - south:.2g} large and around ({(west + east) / 2:.6g}, "
                        f"{(south + north) / 2:.6g}): these look like degrees; give metres, as of a projection such as UTM")
+
+
+def _doubt_about_crs(document: Any) -> str:
+    """Return that the file calls its coordinates degrees, in words; "" where it does not."""
+    crs = document.get("crs")
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if not (isinstance(name, str) and _CRS_IN_DEGREES.search(name)):
+        return ""
+    return f"its crs is {quoted(name)}, whose coordinates are degrees, and they are taken as metres; leave crs out if they are"
 
 
 def _parse_json(text: str) -> Any:
