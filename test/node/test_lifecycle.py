@@ -1,7 +1,9 @@
 """The managed node, brought up and taken down in the order in which Nav2's lifecycle manager does it."""
 
 import importlib.util
+import math
 import signal
+import time
 
 import pytest
 
@@ -33,6 +35,7 @@ class Manager:
         self._change, self._get = (self._client.node.create_client(kind, f"{namespace}/{name}/{service}") for kind, service in (
             (ChangeState, "change_state"), (GetState, "get_state")))
         self._client.wait_for(lambda: self._change.service_is_ready() and self._get.service_is_ready(), "a managed node")
+        assert self.state  # so that the node has found this client
 
     def change(self, transition: int) -> bool:
         """Ask for a transition; whether it succeeded."""
@@ -44,7 +47,17 @@ class Manager:
 
     @property
     def state(self) -> int:
-        return self._client.response(self._get.call_async(GetState.Request())).current_state.id
+        """Asked for until there is an answer: one is lost where the node has not yet found this client, which that cannot see."""
+        asked, futures = -math.inf, []
+
+        def answer():
+            nonlocal asked
+            if time.monotonic() > asked + 5.0:
+                asked = time.monotonic()
+                futures.append(self._get.call_async(GetState.Request()))
+            return next((future.result() for future in futures if future.done() and future.result()), None)
+
+        return self._client.wait_for(answer, "the state of the node").current_state.id
 
 
 @pytest.mark.slow
