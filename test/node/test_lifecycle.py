@@ -1,9 +1,7 @@
 """The managed node, brought up and taken down in the order in which Nav2's lifecycle manager does it."""
 
 import importlib.util
-import math
 import signal
-import time
 
 import pytest
 
@@ -47,17 +45,7 @@ class Manager:
 
     @property
     def state(self) -> int:
-        """Asked for until there is an answer: one is lost where the node has not yet found this client, which that cannot see."""
-        asked, futures = -math.inf, []
-
-        def answer():
-            nonlocal asked
-            if time.monotonic() > asked + 5.0:
-                asked = time.monotonic()
-                futures.append(self._get.call_async(GetState.Request()))
-            return next((future.result() for future in futures if future.done() and future.result()), None)
-
-        return self._client.wait_for(answer, "the state of the node").current_state.id
+        return self._client.ask(self._get, GetState.Request()).current_state.id
 
 
 @pytest.mark.slow

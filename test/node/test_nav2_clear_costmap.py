@@ -16,5 +16,5 @@ def test_it_answers_where_it_is_asked_for_and_nothing_is_cleared(planners, map_f
     client = planners.client()
     caller = client.node.create_client(ClearEntireCostmap, "global_costmap/clear_entirely_global_costmap")
     client.wait_for(caller.service_is_ready, "the service that clears the costmap")
-    assert isinstance(client.response(caller.call_async(ClearEntireCostmap.Request())), ClearEntireCostmap.Response)
+    assert isinstance(client.ask(caller, ClearEntireCostmap.Request()), ClearEntireCostmap.Response)
     assert client.plan(START, GOAL)[1]["error_name"] == "NONE"

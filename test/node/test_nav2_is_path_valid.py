@@ -39,7 +39,7 @@ def client(running):
 def ask(client: Client, path, kind=IsPathValid):
     caller = client.node.create_client(kind, "is_path_valid")
     client.wait_for(caller.service_is_ready, "the service is_path_valid")
-    return client.response(caller.call_async(kind.Request(path=path)))
+    return client.ask(caller, kind.Request(path=path))
 
 
 def message(poses, frame="map"):

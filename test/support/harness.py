@@ -15,6 +15,8 @@ from support.forked import ForkedPlanner
 
 #: Maximum time until something happens that a test waits for, on a machine that is busy [s].
 DEADLINE = 60.0
+#: Time after which a request is made again [s].
+ASK_AGAIN = 10.0
 
 
 class NodeProcess:
@@ -184,15 +186,35 @@ class Client:
 
     def request(self, kind, name: str, **fields):
         """Call a service of the planner, such as get_plan; a future with its response."""
+        return self._service(kind, name).call_async(kind.Request(**fields))
+
+    def call(self, kind, name: str, **fields):
+        """Call a service of the planner and wait for its response."""
+        return self.ask(self._service(kind, name), kind.Request(**fields))
+
+    def _service(self, kind, name: str):
         client = self._services.get(name)
         if client is None:
             client = self._services[name] = self.node.create_client(kind, f"planner/{name}")
         self.wait_for(client.service_is_ready, f"the service {name}")
-        return client.call_async(kind.Request(**fields))
+        return client
 
-    def call(self, kind, name: str, **fields):
-        """Call a service of the planner and wait for its response."""
-        return self.response(self.request(kind, name, **fields))
+    def ask(self, service, request):
+        """Make a request of a service that is ready, and wait for the response.
+
+        A server that has not found its client yet drops the response; the client has found the server, and cannot see that. So a
+        request without a response is made again, which it must bear.
+        """
+        last, futures = -math.inf, []
+
+        def response():
+            nonlocal last
+            if time.monotonic() > last + ASK_AGAIN:
+                last = time.monotonic()
+                futures.append(service.call_async(request))
+            return next((future.result() for future in futures if future.done() and future.result()), None)
+
+        return self.wait_for(response, "an answer of a service")
 
     def response(self, future):
         """Wait for what a service answers."""
