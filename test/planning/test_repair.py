@@ -14,6 +14,8 @@ from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import SIDES, WORDS
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
 from dubins_rrt_ros.planning.search import repair as repair_module
+from dubins_rrt_ros.planning.search.cost_to_go import CostToGo
+from dubins_rrt_ros.planning.search.narrow_runs import NarrowRuns
 from dubins_rrt_ros.planning.search.repair import repaired
 from dubins_rrt_ros.planning.work import Work
 
@@ -169,6 +171,24 @@ def test_a_fit_with_many_samples_takes_its_course_in_slices(middle, tunnel):
     fit.run(0.2007, 60, 5e-4, 1e-9)
     assert fit.is_done and work.done > 100
     assert fit.path().length == pytest.approx(repair(path, tunnel).length, rel=1e-3)
+
+
+def test_a_chain_of_very_many_samples_is_left_as_it_is():
+    """Its samples would take gigabytes, and those of one arc time that no deadline ends."""
+    line = path_over([(0.0, 0.0, 0.0), (600.0, 0.0, 0.0)], VEHICLE.turning_radius)
+    work = Work()
+    assert repair(line, PolygonMap(shapely.box(-1, -1, 601, 1)), work) is None
+    assert work.done == 0
+
+
+@pytest.mark.parametrize(("radius", "same"), [(0.0, True), (0.2, False)])
+def test_what_is_not_repaired_is_judged_by_the_checker_itself(middle, tunnel, radius, same):
+    """A point can need no less clearance than none; its paths passed by a checker that knew no test of the user's."""
+    problem, field = Problem(tunnel, Vehicle(1.0, radius), middle.start, middle.end), ClearanceField(tunnel)
+    checker = field.collision_checker(problem.vehicle)
+    runs = NarrowRuns(problem, 0, field, checker, CostToGo.to_goal(problem, field), np.array([problem.goal]))
+    assert (runs._relaxed_checker(0.1) is checker) == same
+    assert (runs.repaired(middle, Work()) is middle) == same
 
 
 def test_where_no_step_is_to_be_had_there_is_no_path(middle, tunnel, monkeypatch):

@@ -200,11 +200,7 @@ class Client:
         return client
 
     def ask(self, service, request):
-        """Make a request of a service that is ready, and wait for the response.
-
-        A server that has not found its client yet drops the response; the client has found the server, and cannot see that. So a
-        request without a response is made again, which it must bear.
-        """
+        """Wait for the response to a request that bears to be made again: a server drops that to a client not found yet."""
         last, futures = -math.inf, []
 
         def response():

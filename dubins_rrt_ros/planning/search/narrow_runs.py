@@ -121,8 +121,8 @@ class NarrowRuns:
 
     def _relaxed_checker(self, relaxation: float) -> CollisionChecker:
         vehicle = self._problem.vehicle
-        self._lacking = min(relaxation * vehicle.turning_radius, MOST_RELAXATION * vehicle.robot_radius) if relaxation else 0.0
-        if not relaxation:
+        self._lacking = min(relaxation * vehicle.turning_radius, MOST_RELAXATION * vehicle.robot_radius)
+        if self._lacking == 0:  # of a point too, whose paths are not repaired, and not judged again
             return self._checker
         return CollisionChecker(clearance=self._field.kernel, required_clearance=vehicle.required_clearance - self._lacking)
 

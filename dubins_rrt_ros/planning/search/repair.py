@@ -33,8 +33,9 @@ DAMPING, LEAST_DAMPING, MOST_DAMPING, RISE, FALL = 1e-4, 1e-9, 1e6, 4.0, 5.0
 MOST_SOLUTIONS = 6
 #: Maximum length of a chain that is tried, relative to the length at first: a step can lead anywhere.
 MOST_LONGER = 2.0
-#: Maximum number of arcs of a chain: a step takes time with the third power of that.
-MOST_ARCS = 300
+#: Maximum number of arcs of a chain, as a step takes time with the third power of that; and its maximum length [turning radii],
+#: as the samples of an arc are measured without a look at the time.
+MOST_ARCS, MOST_LENGTH = 300, 500.0
 #: Length of an arc that is left out [turning radii].
 NEGLIGIBLE = 1e-9
 #: The point of a disc whose clearance counts, in the vehicle's frame, and what that exceeds the required one by [m].
@@ -57,7 +58,7 @@ def repaired(path: Path, clearance: Clearance, required: float, lacking: float, 
         work: counts slices of the iterations; once it is over there is no path.
     """
     fit = _Fit(path, clearance, DISC, work)
-    if fit.size > MOST_ARCS:
+    if fit.size > MOST_ARCS or path.length > MOST_LENGTH * path.radius:
         return None
     for shortfall in SHORTFALLS:
         if fit.run(required - shortfall * lacking, ITERATIONS, COARSE_SPACING, COARSE_PRECISION) > HOPELESS:
