@@ -206,3 +206,13 @@ def named_flags(page):
 def test_every_flag_of_ours_that_is_named_exists(page):
     unknown = [words for words in named_flags(page) if not re.search(rf"(?<![\w-]){words[-1]}(?![\w-])", help_of(*words[:-1]))]
     assert unknown == []
+
+
+def test_the_manual_s_table_of_warnings_quotes_them():
+    text = (ROOT / "docs/howto/troubleshooting.md").read_text()
+    table = text.split("## It warns about what it was given", 1)[1].split("\n## ", 1)[0]
+    firsts = [line.split("|")[1] for line in table.splitlines() if line.startswith('| "')]
+    quoted = [words for first in firsts for words in re.findall(r'"([^"]+)"', first)]
+    package = Path(dubins_rrt_ros.__file__).parent
+    source = " ".join(file.read_text() for file in package.rglob("*.py"))
+    assert len(quoted) > 10 and [words for words in quoted if words not in source] == []

@@ -79,7 +79,7 @@ class _Path:
         can = [metres >= 0 and word in ("L", "S", "R") and radius >= self._radius * (1 - END)
                for word, radius, metres in self._segments]
         _demand(all(can), "the path turns tighter than the vehicle can, or drives backwards")
-        _demand(own <= self._length * (1 + MARGIN), f"the path is {own:.6f} m long")
+        _demand(own <= self._length * (1 + MARGIN), f"the path is {own:.9g} m long")
         poses = self._poses()
         x, y, heading = self._world.own(self._request["goal"])
         off = math.hypot(poses[-1, 0] - x, poses[-1, 1] - y) - self._request["goal_tolerance_xy"]

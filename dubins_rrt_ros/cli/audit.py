@@ -17,7 +17,7 @@ from dubins_rrt_ros.planning.maps.frame import LARGEST_YAW
 from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
 from dubins_rrt_ros.planning.plan_file import HOOKS, PlanFileError, read_path, read_request
 from dubins_rrt_ros.planning.result import pose_spacing
-from dubins_rrt_ros.planning.text import one_line, quoted
+from dubins_rrt_ros.planning.text import fixed, one_line, quoted
 from dubins_rrt_ros.planning.world import problem_with_costs
 
 from .common.documents import read_poses_or_json
@@ -175,10 +175,10 @@ def _sentence(file: str, verdict: Verdict) -> str:
     count = f"fails with {len(found.findings)} finding{'s' * (len(found.findings) > 1)}"
     vehicle = verdict.problem.vehicle
     required = "of its footprint" if vehicle.footprint else f"for a robot radius of {vehicle.robot_radius:g} m"
-    return (f"{file} {'passes' if found.ok else count}: length {verdict.length:.3f} m, least clearance "
-            f"{found.min_clearance:.4f} m {required}, greatest curvature {found.max_curvature:.4f} 1/m for a turning radius of "
-            f"{vehicle.turning_radius:g} m." + (f" Not judged: {one_line(', '.join(verdict.not_judged))}." if verdict.not_judged
-                                                else ""))
+    not_judged = f" Not judged: {one_line(', '.join(verdict.not_judged))}." if verdict.not_judged else ""
+    return (f"{file} {'passes' if found.ok else count}: length {fixed(verdict.length, 3)} m, least clearance "
+            f"{fixed(found.min_clearance, 4)} m {required}, greatest curvature {fixed(found.max_curvature, 4)} 1/m for a turning "
+            f"radius of {vehicle.turning_radius:g} m.{not_judged}")
 
 
 def _document(verdict: Verdict, map_name: str) -> dict[str, Any]:

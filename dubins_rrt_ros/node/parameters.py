@@ -10,8 +10,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, Vehicle, options
-from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
-from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
+from dubins_rrt_ros.planning.maps.files import MAX_CELLS, UNKNOWN_GREY
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 from dubins_rrt_ros.planning.text import quoted_name
 from dubins_rrt_ros.planning.vehicle import overridden
@@ -30,7 +29,7 @@ class NodeOptions:
                                     "followed; map_file may be elsewhere; empty: any")
     global_frame: str = option("map", "frame of map, poses and path")
     map_transient_local: bool = option(True, "subscribe to the map as transient local, as map_server publishes it")
-    max_map_cells: int = option(MAX_MAP_CELLS, "maximum size of a map", unit="cells", low=1, high=2**31 - 1)
+    max_map_cells: int = option(MAX_CELLS.default, MAX_CELLS.help, unit=MAX_CELLS.unit, low=MAX_CELLS.low, high=MAX_CELLS.high)
     unknown_grey: int = option(UNKNOWN_GREY.default, UNKNOWN_GREY.help, low=UNKNOWN_GREY.low, high=UNKNOWN_GREY.high)
     occupied_thresh: float = option(0.65, "cells of a grid by topic are occupied from this share on, as in map_server's files; "
                                           "those between the two thresholds are unknown", low=0.0, high=1.0)

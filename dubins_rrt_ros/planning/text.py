@@ -2,6 +2,7 @@
 
 import math
 import reprlib
+from collections.abc import Sequence
 from typing import Any
 
 #: The longest message [characters], of a longer one the middle is left out; a path may take 4096 of them.
@@ -9,6 +10,8 @@ LONGEST = 6000
 _MOST_QUOTED = 200
 #: Maximum length of a quoted name [characters].
 _LONGEST_NAME = 220
+#: Absolute number from which decimals say nothing: no map reaches so far [m].
+_FAR = 1e10
 
 
 def one_line(message: str) -> str:
@@ -33,10 +36,15 @@ def quoted_name(name: str) -> str:
     return text if len(text) <= _LONGEST_NAME else f"{text[:half]}...{text[-half:]}"
 
 
-def at(point: tuple[float, float]) -> str:
-    """Return a position (x, y) [m] with two decimals."""
-    x, y = (round(coordinate, 2) + 0.0 for coordinate in point)  # no -0.00
-    return f"({x:.2f}, {y:.2f})"
+def fixed(value: float, decimals: int) -> str:
+    """Return a number with so many decimals; six digits of one that is beyond all maps."""
+    rounded = round(value, decimals) + 0.0  # no -0.00
+    return f"{rounded:.{decimals}f}" if abs(value) < _FAR else f"{value:.6g}"
+
+
+def at(point: Sequence[float], decimals: int = 2) -> str:
+    """Return a position (x, y) [m], or more coordinates, with so many decimals."""
+    return f"({', '.join(fixed(coordinate, decimals) for coordinate in point)})"
 
 
 def metres(value: float) -> str:

@@ -36,6 +36,7 @@ from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings, demand_settings
 from .stops import HEADINGS, Stop, last_place, least_length, legs_along, passing_indices, stops_of
+from .text import at
 from .work import Work
 from .world import problem_with_costs, world_of
 
@@ -352,7 +353,7 @@ class _Call:
             return self._plan(Status.CANCELLED, "Cancelled before a first path.", root, cancelled=True)
         x, y, _ = stop.poses[0]
         name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
-        status, place = found.status, f"{name} at ({x:.3f}, {y:.3f})"
+        status, place = found.status, f"{name} at {at((x, y), 3)}"
         why = f"On the way to {place}: {found.message}"
         if found.status == Status.TIMEOUT or (found.status == Status.NO_VALID_PATH and not self._is_of_all_ends(found.problem)):
             # What is found out about one heading at a waypoint need not hold for all; and a leg has but a part of the time.

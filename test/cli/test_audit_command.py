@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -302,3 +303,13 @@ def test_the_help_teaches_by_an_example_that_runs(capsys):
         main(["audit", "--help"])
     text = " ".join(capsys.readouterr().out.split())
     assert "dubins_rrt audit theirs.json maze --turning-radius 1 --footprint" in text and "[[x, y, yaw], ...]" in text
+
+
+def test_figures_beyond_all_maps_are_short(document, capsys):
+    *curves, last = document["curves"]
+    for change in ({"goal": [1e300, 2.0, 0.0]}, {"curves": [*curves, last | {"lengths": [1e200, 1e200, 1e200]}]},
+                   {"curves": [*curves, last | {"start": [1e300, -1e300, 0.0]}]},
+                   {"waypoints": [[1e300, 1.0]], "waypoint_indices": [0]}):
+        status, out, error = run(write(document | change), "hall.wkt", capsys=capsys)
+        assert (status, error) == (1, "")
+        assert "e+" in out and max(map(len, re.findall(r"[\d.]+", out))) < 20

@@ -169,6 +169,7 @@ def test_rows_are_named_and_problems_chosen():
     ([entry(robot_radius=-1)], "robot_radius is -1"), ([entry(robot_radius=10**400)], "robot_radius is 1000"),
     ([entry(goal=[10**400, 0, 0])], "The goal pose is [1000"), ([entry(map="m" * 5000)], "there is no map file"),
     ([entry(name="two\nlines")], "problem 1: its name is 'two\\nlines'; give one of 200 printable characters at most"),
+    ([entry(map=".")], "problem 1, hall: its map set is a directory; give the map file in it (.yaml, .geojson, .wkt)"),
     ([entry(map="two\nlines.wkt")], "problem 1, hall: there is no map file set/two lines.wkt")])
 def test_a_file_of_problems_that_is_none_takes_one_line(document, says, capsys):
     Path("set/problems.json").write_text(json.dumps(document))
@@ -183,6 +184,13 @@ def test_what_the_output_had_is_kept_until_there_is_a_first_line(capsys):
     assert "bad.wkt" in refusal(problems(entry(map="bad.wkt")), "--out", "runs.jsonl", *BUDGET, capsys=capsys)
     assert Path("runs.jsonl").read_text() == "of before\n"
     assert [line["problem"] for line in bench(problems(entry()), *BUDGET)] == ["hall"]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_without_a_line_there_is_no_output(jobs, capsys):
+    Path("set/bad.wkt").write_text("POLYGON ((0 0, 1")
+    assert "bad.wkt" in refusal(problems(entry(map="bad.wkt")), "--out", "runs.jsonl", *BUDGET, "--jobs", jobs, capsys=capsys)
+    assert not Path("runs.jsonl").exists()
 
 
 def test_files_that_cannot_be_read_take_one_line(capsys):

@@ -113,7 +113,7 @@ def test_a_slip_takes_one_line_that_suggests_what_was_meant(words, says, capsys)
     assert says in refusal(*words, capsys=capsys)
 
 
-@pytest.mark.parametrize("name", ["nowhere/at/all.yaml", "m.jpg", "maz.png"], ids=["other", "photo", "picture"])
+@pytest.mark.parametrize("name", ["nowhere/at/all.yaml", "m.jpg", "maz.png", "."], ids=["other", "photo", "picture", "folder"])
 def test_a_map_that_resembles_none_gets_no_suggestion(name, capsys):
     assert "did you mean" not in refusal("plan", name, *ENDS, capsys=capsys)
 

@@ -304,7 +304,8 @@ def test_an_image_that_is_none_is_refused_and_the_map_stays(talk, bad_files, con
 
 
 @pytest.mark.parametrize(("url", "words"), [
-    ("", ["empty"]), ("nowhere.yaml", ["nowhere.yaml", "no such map file", "maze.yaml"]), ("/", ["no such map file"]),
+    ("", ["empty"]), ("nowhere.yaml", ["nowhere.yaml", "no such map file", "maze.yaml"]),
+    ("/", ["/: is a directory; give the map file in it"]),
     ("/nowhere/a.yaml", ["/nowhere/a.yaml"]), ("/dev/zero", ["no such map file"]), ("n" * 5000 + ".yaml", ["no such map file"]),
     ("two\nlines\x1b[0m.yaml", ["two", "lines"]), ("http://example.org/maze.yaml", ["http://", "file://"]),
     ("s3://bucket/maze.yaml", ["s3://", "file://"]), ("file://elsewhere/maze.yaml", ["'elsewhere'", "file:///PATH"]),

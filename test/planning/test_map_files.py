@@ -11,7 +11,8 @@ from PIL import Image
 from support.images import pgm, row_of
 from support.map_files import FIELDS, image_named, refusal, write_grid, yaml_of
 
-from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
+from dubins_rrt_ros.planning import OptionError
+from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError, MapNotFound
 from dubins_rrt_ros.planning.maps.files import load_map
 from dubins_rrt_ros.planning.maps.grids import save_map
 from dubins_rrt_ros.planning.maps.model import GridMap, PolygonMap, Thresholds, rasterise
@@ -32,6 +33,31 @@ def test_origin_with_yaw_places_the_cells(tmp_path):
     assert grid.origin == (1, 2, np.pi / 2)
     assert grid.resolution == 0.1
     np.testing.assert_allclose(grid.to_map_frame(np.array([0.3, 0.1])), [0.9, 2.3])
+
+
+@pytest.mark.parametrize("name", ["maze", "parking.geojson"])
+@pytest.mark.parametrize("value", ["9", None, 9.5, 1e6, True, 0, -1, 2**31, float("nan"), [9]])
+def test_a_number_of_cells_that_is_none_is_refused(name, value):
+    with pytest.raises(OptionError, match=r"^max_map_cells is .*; it takes an integer from 1 to 2147483647: "):
+        load_map(name, max_map_cells=value)
+
+
+def test_other_arguments_of_the_wrong_type_are_refused_by_name():
+    for path in (3, None, b"maze", ["maze"]):
+        with pytest.raises(TypeError, match=r"^path is .*; give a text or a pathlib\.Path$"):
+            load_map(path)
+    for directory in (3, b"maps"):
+        with pytest.raises(TypeError, match="^map_directory is "):
+            load_map("maze", map_directory=directory)
+    with pytest.raises(MapError, match="resolution is '0.1'; leave that out"):
+        load_map("maze", resolution="0.1")
+
+
+def test_a_folder_or_no_name_at_all_is_no_map(tmp_path):
+    with pytest.raises(MapNotFound, match=r"is a directory; give the map file in it \(\.yaml, \.geojson, \.wkt\)$"):
+        load_map(tmp_path)
+    with pytest.raises(MapNotFound, match="^the name of the map is empty; give "):
+        load_map("")
 
 
 @pytest.mark.parametrize(("name", "remedy"), [

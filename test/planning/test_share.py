@@ -64,6 +64,15 @@ def test_an_unknown_name_is_answered_with_the_known_ones(name, tmp_path, monkeyp
         assert own in message
 
 
+@pytest.mark.parametrize("name", [".", "/", "plans", "./plans", "plans.yaml", "file:///tmp", "package://dubins_rrt_ros/maps"])
+def test_a_folder_is_called_one_and_its_files_are_not_told(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("plans", "plans.yaml"):
+        Path(folder).mkdir()
+        Path(folder, "secret.yaml").touch()
+    assert refusal(name) == f"{name}: is a directory; give the map file in it (.yaml, .geojson, .wkt)"
+
+
 def test_an_empty_name_is_called_so():
     assert refusal("").startswith("the name of the map is empty; give a path, ")
 

@@ -173,15 +173,20 @@ def _measure_node(arguments: argparse.Namespace) -> int:
 
 
 def _written(file: str, measured: Generator[dict[str, Any], None, None], count: int) -> list[dict[str, Any]]:
-    """Write lines of JSON as they come, and return them. What the file had is kept until there is one."""
+    """Write lines of JSON as they come, and return them. Until there is one the file stays as it was, or away."""
     lines: list[dict[str, Any]] = []
-    with open(file, "a", encoding="utf-8") as out, contextlib.closing(measured):
-        for line in with_bar(measured, count, " requests"):
-            if not lines and os.path.isfile(file):
-                out.truncate(0)
-            out.write(json.dumps(line, allow_nan=False) + "\n")
-            out.flush()
-            lines.append(line)
+    is_new = not os.path.lexists(file)
+    try:
+        with open(file, "a", encoding="utf-8") as out, contextlib.closing(measured):
+            for line in with_bar(measured, count, " requests"):
+                if not lines and os.path.isfile(file):
+                    out.truncate(0)
+                out.write(json.dumps(line, allow_nan=False) + "\n")
+                out.flush()
+                lines.append(line)
+    finally:
+        if is_new and not lines:
+            os.remove(file)
     return lines
 
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from dubins_rrt_ros.planning.text import one_line
+from dubins_rrt_ros.planning.text import fixed, one_line
 
 from ..common.documents import read_json, read_text
 from ..common.parser import UsageError
@@ -177,4 +177,4 @@ def _best(planners: Mapping[str, list[RunRecord]], given: float | None) -> Best:
     if given is not None and given <= run.cost:
         return Best(given, "as given")
     found = f"the best of these runs, of {run.planner} with seed {run.seed}" if run.solved else "no run is solved"
-    return Best(run.cost, found if given is None else f"**new**: {found}, below the {given:.4f} m given")
+    return Best(run.cost, found if given is None else f"**new**: {found}, below the {fixed(given, 4)} m given")

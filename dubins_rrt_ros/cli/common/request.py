@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import GridMap, InvalidPose, Map, MapNotFound, OptionError, Problem, Settings, load_map
 from dubins_rrt_ros.planning.curves.path import Path as DrivenPath
-from dubins_rrt_ros.planning.maps.files import UNKNOWN_GREY
+from dubins_rrt_ros.planning.maps.files import MAX_CELLS, UNKNOWN_GREY
 from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import OMITTED_ENDING, find_map, installed_maps, maps_directory
-from dubins_rrt_ros.planning.maps.opening import MAX_MAP_CELLS
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS, OTHER_ENDINGS
 from dubins_rrt_ros.planning.plan_file import PlanFileError, read_path, read_request, read_waypoints
 from dubins_rrt_ros.planning.problem import Waypoint
@@ -51,8 +50,8 @@ def add_map_arguments(parser: argparse.ArgumentParser, pictures: bool = True) ->
     """Give `parser` the argument MAP, which is returned, and the flags for it, those for pictures too if they are wanted."""
     action = parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
                                  help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
-    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_MAP_CELLS,
-                        help=f"maximum number of cells of a grid; default {MAX_MAP_CELLS}")
+    parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_CELLS.default,
+                        help=f"{MAX_CELLS.describe()}; default {MAX_CELLS.default}")
     if not pictures:
         return action
     parser.add_argument("--resolution", metavar="m", type=float, default=None,
@@ -72,12 +71,12 @@ def find_map_or_suggest(name: str) -> Path:
     """Find the file of a map.
 
     Raises:
-        MapNotFound: there is none; the message suggests an installed map with a similar name, unless a picture was named.
+        MapNotFound: there is none; the message suggests an installed map of a similar name, unless a picture or folder is named.
     """
     try:
         return find_map(name)
     except MapNotFound as error:
-        if Path(name).suffix.lower() not in ("", *MAP_ENDINGS, *OTHER_ENDINGS):
+        if os.path.isdir(name) or Path(name).suffix.lower() not in ("", *MAP_ENDINGS, *OTHER_ENDINGS):
             raise
         files = sorted(installed_maps(), key=lambda file: file.suffix == OMITTED_ENDING)  # the last of a stem counts
         own = {file.stem: file.stem if file.suffix == OMITTED_ENDING else file.name for file in files}

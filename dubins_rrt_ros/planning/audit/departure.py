@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from ..problem import Problem
+from ..text import at
 from ..vehicle import Vehicle
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 from .sweep import CONTACT, MOST_POINTS, POINT, PRECISION, TOUCH, Arcs, PolygonSweep, clearance_findings, pose_gaps, refine
@@ -61,14 +62,14 @@ def judge_departure(arcs: Arcs, problem: Problem, obstacles: Obstacles, check_ti
         return Departure((), 0.0, math.inf)
     x, y = float(arcs.x[0]), float(arcs.y[0])
     if length == math.inf:
-        return Departure((f"at its start ({x:.3f}, {y:.3f}) the vehicle is too near to an obstacle, and never clear",), 0.0, 0.0)
+        return Departure((f"at its start {at((x, y), 3)} the vehicle is too near to an obstacle, and never clear",), 0.0, 0.0)
     leaving, _ = _parts(arcs, length)
     room = start_room(problem, obstacles)
     if room < -problem.start_slack - CONTACT:
-        return Departure((f"at ({x:.3f}, {y:.3f}) the start is {-room:.6f} m too near to an obstacle, more than start_slack "
+        return Departure((f"at {at((x, y), 3)} the start is {-room:.6f} m too near to an obstacle, more than start_slack "
                           f"{problem.start_slack:g} m",), length, 0.0)
     least, place, decided = _least_of_smaller(leaving, problem, obstacles, min(room, 0.0), check_time)
-    findings = f"at ({place[0]:.3f}, {place[1]:.3f}) the vehicle comes nearer to an obstacle than at its start",
+    findings = f"at {at(place, 3)} the vehicle comes nearer to an obstacle than at its start",
     return Departure(() if decided else findings, length, least)
 
 

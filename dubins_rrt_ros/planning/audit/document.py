@@ -8,7 +8,7 @@ import numpy as np
 
 from ..option import is_number
 from ..problem import InvalidPose, checked_waypoint
-from ..text import quoted
+from ..text import at, quoted
 from .cost import COST_ERROR, SHARE_ERROR
 from .sweep import PRECISION, SHARE, Arcs
 from .verdict import TOLERANCE, Audit, driven_arcs, in_order, passing_findings
@@ -100,7 +100,7 @@ def pose_findings(poses: np.ndarray, path: "Path", spacing: float) -> list[str]:
     places, off = _places(poses, arcs, begins, TOLERANCE + 8 * np.finfo(float).eps * float(np.abs(poses[:, :2]).max()))
     if off:
         k, distance, turned = off[0]
-        return [f"pose {k} at ({poses[k][0]:.3f}, {poses[k][1]:.3f}) is {distance:.6g} m and {turned:.6g} rad from what is ahead "
+        return [f"pose {k} at {at(poses[k][:2], 3)} is {distance:.6g} m and {turned:.6g} rad from what is ahead "
                 f"on the curves; {len(off)} of {len(poses)} poses are off"]
     return list(_gap_findings(np.array(places), begins, arcs.curvature, spacing))
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..problem import Problem
+from ..text import at, fixed
 from .sweep import Arcs, clearance_findings
 from .verdict import TOLERANCE, Audit, apart, goal_findings
 
@@ -86,7 +87,7 @@ def _end_findings(poses: np.ndarray, problem: Problem, tolerance_xy: float, tole
     findings = []
     off, turned = apart(poses[0], problem.start)
     if off > tolerance_xy or turned > tolerance_yaw:
-        findings.append(f"the path starts {off:.6f} m and {turned:.6f} rad from the start")
+        findings.append(f"the path starts {fixed(off, 6)} m and {turned:.6f} rad from the start")
     return findings + goal_findings(poses[-1], problem, tolerance_xy, tolerance_yaw)
 
 
@@ -97,16 +98,17 @@ def _motion_findings(poses: np.ndarray, steps: _Steps, radius: float, tolerance_
     allowed, sideways = steps.length / radius * (1 + TOLERANCE), tolerance_yaw * steps.length
     findings = []
     for excess, tolerance, does in (
-            (steps.turn - allowed, tolerance_yaw, f"turns left {{:.6f}} rad more than a radius of {radius:g} m allows"),
-            (-steps.turn - allowed, tolerance_yaw, f"turns right {{:.6f}} rad more than a radius of {radius:g} m allows"),
-            (steps.left - sideways, tolerance_xy, "runs {:.6f} m more to the left than its yaw allows"),
-            (-steps.left - sideways, tolerance_xy, "runs {:.6f} m more to the right than its yaw allows"),
-            (-steps.ahead, tolerance_xy, "runs {:.6f} m backward, which the vehicle cannot")):
+            (steps.turn - allowed, tolerance_yaw, f"turns left {{}} rad more than a radius of {radius:g} m allows"),
+            (-steps.turn - allowed, tolerance_yaw, f"turns right {{}} rad more than a radius of {radius:g} m allows"),
+            (steps.left - sideways, tolerance_xy, "runs {} m more to the left than its yaw allows"),
+            (-steps.left - sideways, tolerance_xy, "runs {} m more to the right than its yaw allows"),
+            (-steps.ahead, tolerance_xy, "runs {} m backward, which the vehicle cannot")):
         amount, first, last = _worst_stretch(excess)
         if amount > tolerance:
             x, y, _ = poses[first]
-            findings.append(f"from pose {first} at ({x:.3f}, {y:.3f}) to pose {last}, {steps.length[first:last].sum():.3f} m on, "
-                            f"the path {does.format(amount)}")
+            on = fixed(float(steps.length[first:last].sum()), 3)
+            findings.append(f"from pose {first} at {at((x, y), 3)} to pose {last}, {on} m on, "
+                            f"the path {does.format(fixed(amount, 6))}")
     return findings
 
 

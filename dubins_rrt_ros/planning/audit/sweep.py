@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..problem import Problem
+from ..text import at, fixed
 from ..vehicle import Vehicle
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
 
@@ -95,18 +96,18 @@ def clearance_findings(arcs: Arcs, problem: Problem, slack: float = 0.0, obstacl
     least, (x, y), decided = _least_clearance(arcs, problem, required_clearance, obstacles, check_time)
     findings = []
     if not decided:
-        findings.append(f"at ({x:.3f}, {y:.3f}) and elsewhere the clearance is so close to {required_clearance:g} m "
+        findings.append(f"at {at((x, y), 3)} and elsewhere the clearance is so close to {required_clearance:g} m "
                         "that it cannot be decided")
     if least < required_clearance - CONTACT:
-        what = _too_near(least, vehicle, f"the {slack:.6f} m that the poses are off their arcs" if slack > CONTACT else "")
-        findings.append(f"at ({x:.3f}, {y:.3f}) {what}")
+        what = _too_near(least, vehicle, f"the {fixed(slack, 6)} m that the poses are off their arcs" if slack > CONTACT else "")
+        findings.append(f"at {at((x, y), 3)} {what}")
     return findings, least
 
 
 def _too_near(least: float, vehicle: Vehicle, off: str) -> str:
     if vehicle.footprint:
-        return f"the footprint's clearance is {least:.6f} m, " + (f"no more than {off}" if off else "which is contact")
-    return (f"the clearance is {least:.6f} m, less than the robot's radius, {vehicle.robot_radius:g} m"
+        return f"the footprint's clearance is {fixed(least, 6)} m, " + (f"no more than {off}" if off else "which is contact")
+    return (f"the clearance is {fixed(least, 6)} m, less than the robot's radius, {vehicle.robot_radius:g} m"
             + (f", and {off}" if off else ""))
 
 

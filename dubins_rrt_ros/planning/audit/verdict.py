@@ -14,7 +14,7 @@ import numpy as np
 
 from ..hooks import are_free
 from ..problem import Pose, Problem, Waypoint
-from ..text import quoted
+from ..text import at, fixed, quoted
 from .departure import judge_clearance
 from .obstacles import Obstacles
 from .sweep import Arcs, any_time, clearance_findings
@@ -125,7 +125,7 @@ def goal_findings(end: Pose, problem: Problem, tolerance_xy: float = TOLERANCE, 
     off, turned = apart(end, problem.goal)
     if off <= problem.goal_tolerance_xy + tolerance_xy and turned <= problem.yaw_tolerance + tolerance_yaw:
         return []
-    return [f"the path ends {off:.6f} m and {turned:.6f} rad from the goal, whose tolerance is "
+    return [f"the path ends {fixed(off, 6)} m and {turned:.6f} rad from the goal, whose tolerance is "
             f"{problem.goal_tolerance_xy:g} m and {problem.yaw_tolerance:g} rad"]
 
 
@@ -137,7 +137,7 @@ def _joint_findings(path: "Path", starts: np.ndarray, ends: np.ndarray) -> list[
         off, turned = apart(a, b)
         total_off, total_turned = total_off + off, total_turned + turned
         if not (off <= TOLERANCE and turned <= TOLERANCE):
-            findings.append(f"before curve {i} the path jumps by {off:.6g} m and {turned:.6g} rad at ({a[0]:.3f}, {a[1]:.3f})")
+            findings.append(f"before curve {i} the path jumps by {off:.6g} m and {turned:.6g} rad at {at(a[:2], 3)}")
     rounding = 8 * np.finfo(float).eps * len(after) * float(np.abs(after[:, :2]).max())
     if not findings and not (total_off <= CREEP + rounding and total_turned <= CREEP):
         findings.append(f"at its joints the path jumps by {total_off:.6g} m and {total_turned:.6g} rad in all")
@@ -152,7 +152,7 @@ def _test_findings(path: "Path", problem: Problem) -> Iterator[str]:
     refused = np.flatnonzero(~are_free(problem.is_free, poses))
     if len(refused):
         x, y, theta = poses[refused[0]]
-        yield f"is_free refuses the path at ({x:.3f}, {y:.3f}, {theta:.3f})"
+        yield f"is_free refuses the path at {at((x, y, theta), 3)}"
 
 
 def passing_findings(path: "Path", waypoints: Sequence[Waypoint]) -> Iterator[str]:
@@ -165,7 +165,7 @@ def passing_findings(path: "Path", waypoints: Sequence[Waypoint]) -> Iterator[st
                 joints = chain([joint], joints)  # where the next one may be, too
                 break
         else:
-            yield f"the path does not pass waypoint {number} at ({x:.3f}, {y:.3f}) after those before it"
+            yield f"the path does not pass waypoint {number} at {at((x, y), 3)} after those before it"
             return
 
 

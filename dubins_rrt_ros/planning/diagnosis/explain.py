@@ -87,7 +87,7 @@ def _refused_by_test(problem: Problem, field: ClearanceField) -> Diagnosis | Non
     for name, pose, occupied in ends:
         if field.own_test and not field.own_test.pose_is_free(*pose):
             x, y, theta = pose
-            message = f"{name} is occupied: is_free refuses ({x:.3f}, {y:.3f}, {theta:.3f}); move it, or check is_free."
+            message = f"{name} is occupied: is_free refuses {at((x, y, theta), 3)}; move it, or check is_free."
             return _diagnosis(occupied, message, (x, y), problem, field)
     return None
 
@@ -96,7 +96,7 @@ def _diagnosis(status: Status, message: str, location: Point, problem: Problem, 
     """Return the diagnosis of an occupied pose; that of a goal names the nearest pose that is free."""
     if status == Status.GOAL_OCCUPIED and (free := nearest_free_pose(problem, field, problem.goal)):
         away = rounded_up(math.dist(free[:2], problem.goal[:2]))
-        message = f"{message[:-1]}; ({free[0]:.3f}, {free[1]:.3f}, {free[2]:.3f}) is free, {away} m away."
+        message = f"{message[:-1]}; {at(free, 3)} is free, {away} m away."
     return Diagnosis(status, message, location)
 
 

@@ -53,19 +53,23 @@ def find_map(name: str) -> Path:
     Raises:
         MapNotFound: there is none.
     """
-    if not name:
-        raise MapNotFound(f"the name of the map is empty; give {_choices()}")
     url = _URL.fullmatch(name)
+    places = [_path_of(url)] if url else _places(name)
     # pathlib's is_file() raises for names that are too long or in a folder that is closed to us.
-    path = next(filter(os.path.isfile, [_path_of(url)] if url else _places(name)), None)
+    path = next(filter(os.path.isfile, places), None)
     if path is None:
-        raise MapNotFound(f"{name}: no such map file; give {_choices()}")
+        raise MapNotFound(f"{name}: {no_folder(places[0]) or f'no such map file; give {_choices()}'}")
     return path
 
 
 def find_own(path: str | os.PathLike[str]) -> Path:
     """Return a path, its leading `~` replaced; or one of the package's own maps, where it alone has that name."""
     return next(filter(os.path.isfile, _places(path)), expand_home(path))
+
+
+def no_folder(path: Path) -> str:
+    """Return what is wrong with a folder that is named as a map; "" where it is none."""
+    return f"is a directory; give the map file in it ({', '.join(MAP_ENDINGS)})" if os.path.isdir(path) else ""
 
 
 def _choices() -> str:
@@ -76,6 +80,8 @@ def _choices() -> str:
 
 def _places(name: str | os.PathLike[str]) -> list[Path]:
     """List the files that a name which is no URL may stand for."""
+    if not os.fspath(name):
+        raise MapNotFound(f"the name of the map is empty; give {_choices()}")
     path, own = expand_home(name), maps_directory()
     is_own = path.parent in (Path("."), Path("maps"))
     return [path, own / path.name, own / f"{path.name}{OMITTED_ENDING}"] if is_own else [path]
