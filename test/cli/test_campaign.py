@@ -81,6 +81,26 @@ def test_a_number_gives_the_same_problem():
     assert contents(random_trial(3, 0)) != contents(random_trial(4, 0)) != contents(random_trial(4, 1))
 
 
+def test_costs_of_cells_are_drawn_last(monkeypatch):
+    """So a problem without them is the one that its number always gave."""
+    found = [random_trial(3, number) for number in range(60)]
+    monkeypatch.setattr(campaign_problems, "WITH_CELL_COSTS", 0.0)
+    without = [random_trial(3, number) for number in range(60)]
+    costly = [trial.settings.cost_weight > 0 for trial in found]
+    assert 15 < sum(costly) < 45
+    for now, then, has_costs in zip(found, without, costly, strict=True):
+        assert has_costs or contents(now) == contents(then)
+        assert replace(now.settings, cost_weight=0.0) == then.settings and now.problem.start == then.problem.start
+        if has_costs and isinstance(now.problem.map, GridMap) and now.settings.informed:
+            # What was free still is, and costs something in places; obstacles stay where they were.
+            assert now.problem.map.with_costs(True).costs is not None
+            blocked, before = now.problem.map.with_costs(True).blocked(False), then.problem.map.blocked(False)
+            assert not (blocked & ~before).any() and (now.fits == then.fits or (before & ~blocked).any())
+            assert (now.problem.map.blocked(True) == then.problem.map.blocked(True)).all()
+        else:
+            assert now.problem.map.id == then.problem.map.id
+
+
 @pytest.mark.parametrize("kind", campaign_problems.KINDS)
 def test_each_kind_of_problem_can_be_planned(kind):
     found = [campaign_problems.KINDS[kind](np.random.default_rng(seed)) for seed in range(10)]
@@ -169,6 +189,53 @@ def test_a_lower_bound_that_is_none_is_found(monkeypatch):
     monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: next(answers))
     found, = (finding for finding in findings_of(walled_trial(), monkeypatch, number=1) if "PlanError" not in finding)
     assert found.startswith("50.000000 m is said to be a lower bound, but there is a path of 1")
+
+
+def costly_trial(preferred_clearance=0.0, **settings):
+    """A problem without obstacles, half of whose cells cost something."""
+    data = np.zeros((14, 20))
+    data[:, 10:] = 40
+    problem = Problem(GridMap(data, 0.5), Vehicle(0.5, 0.4), START, GOAL)
+    return Trial("costly", problem, Settings(**{"samples": 60, "seed": 1, "preferred_clearance": preferred_clearance,
+                                                "cost_weight": 3.0, **settings}))
+
+
+@pytest.mark.parametrize("preferred_clearance", [0.0, 0.5])
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_costs_of_cells_are_judged_with_and_without_a_preferred_clearance(number, preferred_clearance, monkeypatch):
+    trial = costly_trial(preferred_clearance)
+    assert findings_of(trial, monkeypatch, number) == []
+    right = plan(trial.problem, trial.settings)
+    assert right.cost > 1.3 * right.length
+    answers = iter([replace(right, cost=0.9 * right.cost, cost_lower_bound=1.1 * right.cost), right])
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: next(answers))
+    found = " ".join(findings_of(trial, monkeypatch, number))
+    assert f"the cost of the path is {0.9 * right.cost} m, and by the audit {right.cost:.4g}"[:50] in found
+    assert "there is a path with a cost of " in found and f"less than the bound {1.1 * right.cost:.6g} m" in found
+
+
+def test_a_cost_that_is_not_the_length_is_found_where_nothing_else_costs(monkeypatch):
+    right = plan(walled_trial().problem, walled_trial().settings)
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: replace(right, cost=1.01 * right.cost))
+    found = " ".join(findings_of(walled_trial(), monkeypatch, number=2))
+    assert f"the cost of the path is {1.01 * right.cost} m, and by the audit " in found
+
+
+def test_a_wrong_cost_of_an_edge_is_found(monkeypatch):
+    trial = costly_trial(0.5)
+    right = plan(trial.problem, trial.settings)
+    tree = replace(right.tree, edge_costs=0.99 * right.tree.edge_costs, costs=0.99 * right.tree.costs)
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: replace(right, tree=tree))
+    assert "the edge to node 1 costs " in " ".join(findings_of(trial, monkeypatch, 2))
+
+
+def test_a_bound_of_the_cost_above_another_planners_path_is_found(monkeypatch):
+    trial = costly_trial()
+    right = plan(trial.problem, trial.settings)
+    answers = iter([right, replace(right, cost_lower_bound=2 * right.cost)])
+    monkeypatch.setattr(campaign_judge, "plan", lambda problem, settings: next(answers))
+    found, = findings_of(trial, monkeypatch, number=1)
+    assert found.startswith("there is a path with a cost of ") and f"less than the bound {2 * right.cost:.6g} m" in found
 
 
 def test_an_answer_that_changes_is_found(monkeypatch):

@@ -15,6 +15,7 @@ from dubins_rrt_ros.planning import (
     DubinsCurve,
     GridMap,
     Map,
+    Path,
     PathError,
     Plan,
     PlanError,
@@ -34,6 +35,7 @@ from dubins_rrt_ros.planning.audit.edges import audit_curves, clearances, curve_
 from dubins_rrt_ros.planning.audit.sweep import pose_gaps
 from dubins_rrt_ros.planning.curves.dubins import shortest
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
+from dubins_rrt_ros.planning.world import problem_with_costs
 
 from .problems import AMPLE_TIME, MANY_SAMPLES, Trial, random_trial
 
@@ -47,6 +49,8 @@ LATE = 1.0
 IN_TIME = 0.8
 #: Number of random curves for which the planner's verdict is compared with the audit's.
 CURVES = 6
+#: Number of edges of a tree whose costs are compared with the audit's.
+EDGES = 12
 #: Of this number of problems one is planned again, which must give the same answer, and one in another way.
 OTHERS = 20
 #: Number of random paths from an end that no path is said to leave, of turns of each, and of steps of a turn.
@@ -79,14 +83,16 @@ def judge(task: TrialNumber) -> dict[str, Any]:
         begin_of_work = time.process_time()
         answer = plan(trial.problem, trial.settings)
         worked = time.process_time() - begin_of_work
+        trial = replace(trial, problem=problem_with_costs(trial.problem, trial.settings))
         line |= {"status": answer.status.name, "message": answer.message, "samples": answer.samples, "length": answer.length}
         findings = list(_check_answer(trial, answer, worked))
         if task.number % OTHERS == 0:
             findings += _check_repetition(trial, answer)
         elif task.number % OTHERS == 1:
             findings += _check_other_planner(trial, answer)
+        findings += _check_edge_costs(trial, answer.tree, task)
         curves = list(_random_curves(trial.problem, answer.tree, task))
-        findings += [finding for curve in curves for finding in _check_curve(trial.problem, world, curve)]
+        findings += [finding for curve in curves for finding in _check_curve(trial.problem, curve)]
         line |= {"edges": len(answer.tree) - 1, "curves": len(curves), "paths": int(answer.path is not None)}
     except Exception as error:  # whatever it is, the campaign has found it
         where = traceback.extract_tb(error.__traceback__)[-1]
@@ -110,7 +116,7 @@ def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         yield f"it took {answer.planning_time:.3g} s, the limit being {settings.planning_time:g} s"
     if answer.path is not None:
         yield from (f"the path: {finding}" for finding in audit_path(answer.path, problem).findings)
-        yield from _check_cost(answer)
+        yield from _check_cost(trial, answer, answer.path)
         if trial.fits is False:
             yield "it found a path where there is none"
     elif answer.status in (Status.NO_VALID_PATH, Status.TIMEOUT):
@@ -119,16 +125,28 @@ def _check_answer(trial: Trial, answer: Plan, worked: float) -> Iterator[str]:
         yield f"{answer.status.name}: {answer.message}"
 
 
-def _check_cost(answer: Plan) -> Iterator[str]:
-    """Yield what is wrong with the cost of the path, which is measured anew where it is more than the length."""
-    settings, problem = answer.settings, answer.problem
-    if answer.path is None or answer.cost is None or settings.preferred_clearance_of(problem.vehicle) == 0:
-        return
-    cost = cost_of(answer.path, problem, settings)
-    if abs(answer.cost - cost) > COST_ERROR * cost:
-        yield f"the cost of the path is {answer.cost:.6g} m, and by the audit {cost:.6g} m"
-    if answer.cost_lower_bound > (1 + COST_ERROR) * cost:
-        yield f"the cost of the path is {cost:.6g} m, less than the bound {answer.cost_lower_bound:.6g} m"
+def _check_cost(trial: Trial, answer: Plan, path: Path) -> Iterator[str]:
+    """Yield what is wrong with the cost of the path, which is measured anew; it is the length where nothing else costs."""
+    cost = cost_of(path, trial.problem, trial.settings)
+    if answer.cost is None or abs(answer.cost - cost) > COST_ERROR * cost:
+        yield f"the cost of the path is {answer.cost} m, and by the audit {cost:.6g} m"
+    yield from _check_cost_bound(answer, cost)
+
+
+def _check_cost_bound(answer: Plan, cost: float) -> Iterator[str]:
+    """Yield what is wrong with the bound of the cost, given what a path costs."""
+    if answer.cost_lower_bound > (1 + COST_ERROR) * cost + ROUNDING:
+        yield f"there is a path with a cost of {cost:.6g} m, less than the bound {answer.cost_lower_bound:.6g} m"
+
+
+def _check_edge_costs(trial: Trial, tree: Tree, task: TrialNumber) -> Iterator[str]:
+    """Yield what is wrong with the costs of some edges of a tree."""
+    rng = np.random.default_rng((task.seed, task.number, 2))
+    for node in rng.permutation(np.arange(1, len(tree)))[:EDGES].tolist():
+        curve = tree.curve_to(node)
+        cost = cost_of(Path.of_curves(curve.start, curve.end, [curve]), trial.problem, trial.settings)
+        if abs(tree.edge_costs[node] - cost) > COST_ERROR * cost:
+            yield f"the edge to node {node} costs {tree.edge_costs[node]:.6g} m, and by the audit {cost:.6g} m"
 
 
 def _check_invariants(answer: Plan) -> Iterator[str]:
@@ -255,9 +273,10 @@ def _random_curves(problem: Problem, tree: Tree, task: TrialNumber) -> Iterator[
         yield shortest(begin, end, radius)
 
 
-def _check_curve(problem: Problem, world: World, curve: DubinsCurve) -> Iterator[str]:
+def _check_curve(problem: Problem, curve: DubinsCurve) -> Iterator[str]:
     """Yield what is wrong with the planner's verdict on a curve."""
-    free = world.field.curve_is_free(curve, problem.vehicle)
+    assert isinstance(problem.world, World)
+    free = problem.world.field.curve_is_free(curve, problem.vehicle)
     if free and (findings := audit_curves([curve], [curve.end], problem)):
         yield f"the planner holds {curve} to be free: {'; '.join(findings)}"
     if not free:
@@ -279,13 +298,17 @@ def _check_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
 
 def _check_other_planner(trial: Trial, answer: Plan) -> Iterator[str]:
     """Yield what another planner's path proves wrong: a bound above it, or the claim that there is none."""
-    settings = trial.settings
+    problem, settings = trial.problem, trial.settings
     planner = "rrt" if settings.planner == "rrt_star" else "rrt_star"
-    other = plan(trial.problem, replace(settings, planner=planner, informed=not settings.informed, planning_time=AMPLE_TIME,
-                                        samples=min(settings.samples, MANY_SAMPLES)))
+    has_costs = problem.map.costs is not None  # of cells, which are obstacles to one planner and not to the other without them
+    others = replace(settings, planner=planner, informed=has_costs or not settings.informed, planning_time=AMPLE_TIME,
+                     cost_weight=settings.cost_weight if has_costs else 0.0, samples=min(settings.samples, MANY_SAMPLES))
+    other = plan(problem, others)
     if other.path and answer.message.startswith("No path exists"):
         yield f"with {planner} there is a path, but: {answer.message}"
     if other.path and answer.path:
         for bound, length in ((answer.lower_bound, other.path.length), (other.lower_bound, answer.path.length)):
             if bound > length * (1 + ROUNDING) + ROUNDING:
                 yield f"{bound:.6f} m is said to be a lower bound, but there is a path of {length:.6f} m"
+        yield from _check_cost_bound(answer, cost_of(other.path, problem, settings))
+        yield from _check_cost_bound(other, cost_of(answer.path, problem, others))

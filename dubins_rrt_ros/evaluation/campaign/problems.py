@@ -23,9 +23,12 @@ GAPS = 0.0, 1e-7, 1e-4, 4e-4, 6e-4, 0.001, 0.0011
 POSES = 40
 #: Range of samples of most problems, and number for a few.
 SAMPLES, MANY_SAMPLES = (20, 400), 3000
-#: Time limit of most problems, which is never reached, and range of those of some, which is [s].
 #: Time limit of most problems, which only a search without a path reaches, and range of that of some, which end with it [s].
 AMPLE_TIME, SHORT_TIME = 1.0, (0.001, 0.05)
+#: Share of the problems whose cells may have a cost, and range of its weight.
+WITH_CELL_COSTS, CELL_WEIGHTS = 0.5, (0.1, 20.0)
+#: Number of boxes of cells with a cost that are put on a grid, and share of a side that they take at most.
+COST_BOXES, COST_BOX_SHARE = (1, 8), 0.6
 #: Footprints with a circumscribed radius of about 1: x ahead of the reference point, y to its left.
 OUTLINES = {
     "centred": [[1, 0.5], [-1, 0.5], [-1, -0.5], [1, -0.5]],
@@ -58,7 +61,33 @@ def random_trial(seed: int, number: int) -> Trial:
     """Make the problem of this number."""
     rng = np.random.default_rng((seed, number))
     kind = str(rng.choice(list(KINDS), p=list(SHARES)))
-    return replace(KINDS[kind](rng), kind=kind)
+    trial = replace(KINDS[kind](rng), kind=kind)
+    # Drawn last, so that all problems without such costs are as they were before there were any.
+    return _with_cell_costs(trial, rng) if rng.random() < WITH_CELL_COSTS else trial
+
+
+def _with_cell_costs(trial: Trial, rng: np.random.Generator) -> Trial:
+    """Return a problem with a weight of cells, and with boxes of such cells on a grid if the settings know them."""
+    settings = replace(trial.settings, cost_weight=log_uniform(rng, *CELL_WEIGHTS))
+    world_map, fits = trial.problem.map, trial.fits
+    if not isinstance(world_map, GridMap) or settings.weight_of_cells == 0:
+        return replace(trial, settings=settings)
+    if world_map.with_costs(True) is not world_map and not fits:
+        fits = None  # a wall of cells between the thresholds is none any more
+    problem = replace(trial.problem, map=replace(world_map, data=_boxes_of_costs(world_map, rng)))
+    return replace(trial, problem=problem, settings=settings, fits=fits)
+
+
+def _boxes_of_costs(grid: GridMap, rng: np.random.Generator) -> np.ndarray:
+    """Return the cells of a grid with values between the thresholds in some boxes, as far as they are free."""
+    data, limits = grid.data.copy(), grid.thresholds
+    for _ in range(rng.integers(*COST_BOXES)):
+        row, column = (rng.integers(0, size) for size in data.shape)
+        height, width = (rng.integers(1, max(2, math.ceil(COST_BOX_SHARE * size))) for size in data.shape)
+        box = data[row:row + height, column:column + width]
+        values = rng.integers(limits.free_up_to + 1, limits.occupied_from, box.shape if rng.random() < 0.5 else ())
+        box[:] = np.where(limits.blocked(box, allow_unknown=False), box, values)
+    return data
 
 
 def random_settings(rng: np.random.Generator, scale: float) -> Settings:
