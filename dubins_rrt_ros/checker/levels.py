@@ -1,157 +1,143 @@
-"""Squares with costs at their corners, cut into triangles on which the costs are linear, and the levels of these costs."""
+"""Squares with costs at their nodes, cut into triangles on which the costs are linear, and the gates on levels of these costs."""
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-#: The corners (row, column) of the two triangles of a square, by its upward diagonal and by the other one.
-UPWARD = (((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 0), (1, 1)))
-DOWNWARD = (((0, 0), (0, 1), (1, 0)), ((1, 1), (0, 1), (1, 0)))
-
+#: The nodes (column, row) of the two triangles of a square, by either diagonal; the one in the middle is at the right angle.
+CUTS = np.array([[[(0, 0), (1, 0), (1, 1)], [(0, 0), (0, 1), (1, 1)]], [[(1, 0), (0, 0), (0, 1)], [(1, 0), (1, 1), (0, 1)]]])
 #: Half the range of headings in which a path crosses a level [rad], a right angle but for rounding.
 HALF_CIRCLE = np.pi / 2 + 1e-9
 
 
-class Pieces(NamedTuple):
-    """Straight pieces of levels, one for each triangle that a level crosses.
-
-    Attributes:
-        square, triangle, level: (n,) indices.
-        ends: (n, 4) x and y of both ends [m].
-        rising: (n,) direction in which the costs rise there [rad].
-    """
-
-    square: np.ndarray
-    triangle: np.ndarray
-    level: np.ndarray
-    ends: np.ndarray
-    rising: np.ndarray
-
-    def boxes(self, index: np.ndarray, way: np.ndarray, shares: np.ndarray, widen: float) -> np.ndarray:
-        """Return (n, 8) boxes on pieces, as `bounds.py` has them, a little larger than they are.
-
-        Args:
-            index: (n,) of the pieces.
-            way: (n,) 1 where the costs rise along a path, -1 where they fall.
-            shares: (n, 4) ranges of the place, from 0 to 1 along a piece, and of the heading, from -1 to 1 for the headings
-                within a right angle of the direction in which the costs rise, or fall.
-            widen: lengths that are added for rounding [m].
-        """
-        ends = self.ends[index]
-        along = ends[:, 2:] - ends[:, :2]
-        length = np.hypot(*along.T)
-        unit = np.where(length[:, None] > widen, along / np.maximum(length, widen)[:, None], (1.0, 0.0))
-        middle = ends[:, :2] + shares[:, :2].mean(axis=1)[:, None] * along
-        heading = self.rising[index] + np.where(way > 0, 0, np.pi) + shares[:, 2:].mean(axis=1) * HALF_CIRCLE
-        half, turn = (shares[:, 1] - shares[:, 0]) / 2 * length + widen, (shares[:, 3] - shares[:, 2]) / 2 * HALF_CIRCLE
-        return np.column_stack([middle, unit, half, np.full(len(half), widen), heading, turn])
-
-
 class Squares(NamedTuple):
-    """Squares in rows and columns; all arrays of squares are flat, row by row.
+    """Squares with costs at their nodes, by row and column.
 
     Attributes:
         corner: x, y of the first node [m].
         side: that of a square [m].
         costs: (rows + 1, columns + 1) at the nodes [m]; not a number where there are none.
-        levels: (k,) ascending costs, none of them that of a node. Slab i is where the costs are from level i - 1 to level i.
     """
 
-    corner: tuple[float, float]
+    corner: np.ndarray
     side: float
     costs: np.ndarray
-    levels: np.ndarray
 
-    @property
-    def columns(self) -> int:
-        """Number of squares in a row."""
-        return self.costs.shape[1] - 1
+    def corners(self) -> np.ndarray:
+        """Return the (rows, columns, 2, 2) costs at the corners of the squares."""
+        return sliding_window_view(self.costs, (2, 2))
 
-    def corners(self, some: np.ndarray) -> np.ndarray:
-        """Return the (n, 2, 2) costs at the corners of squares, by row and column."""
-        row, column = np.divmod(some, self.columns)
-        return np.stack([np.stack([self.costs[row + i, column + j] for j in (0, 1)], axis=-1) for i in (0, 1)], axis=-2)
+    def triangles(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Return the (n, 2, 3, 3) corners (column, row, cost) of the triangles of squares, cut so that they are less steep."""
+        columns, rows = (CUTS[..., axis] + index[:, None, None, None] for axis, index in enumerate((column, row)))
+        both = np.stack([columns, rows, self.costs[rows, columns]], axis=-1)
+        return both[np.arange(len(both)), np.hypot(*np.moveaxis(gradients(both), -1, 0)).max(axis=2).argmin(axis=1)]
 
-    def is_upward(self, corners: np.ndarray) -> np.ndarray:
-        """Return the diagonal by which squares are cut: that with the less steep triangles."""
-        return np.asarray(squared_slopes(corners, UPWARD) <= squared_slopes(corners, DOWNWARD))
+    def at(self, x: float, y: float) -> tuple[tuple[int, int], float]:
+        """Return row and column of the square that holds a place, and the cost there [m]."""
+        place = (np.array([x, y]) - self.corner) / self.side
+        column, row = np.floor(place).astype(int)
+        if min(column, row) < 0:
+            raise IndexError("a place is outside of all squares")
+        triangles = self.triangles(np.array([row]), np.array([column]))[0]
+        off = place - triangles[:, 1, :2]
+        nearer = np.hypot(*off.T).argmin()  # of the corners at right angles, between which the square is cut
+        return (int(row), int(column)), float(triangles[nearer, 1, 2] + off[nearer] @ gradients(triangles[nearer]))
+
+    def near(self, x: float, y: float, reach: float) -> np.ndarray:
+        """Return the (rows, columns) mask of the squares within a distance [m] of a place."""
+        middles = [low + self.side * (np.arange(count - 1) + 0.5)
+                   for low, count in zip(self.corner, self.costs.shape[::-1], strict=True)]
+        across, up = (np.maximum(np.abs(middle - at) - self.side / 2, 0) for middle, at in zip(middles, (x, y), strict=True))
+        return np.asarray(np.hypot(across, up[:, None]) <= reach)
+
+
+def gradients(triangles: np.ndarray) -> np.ndarray:
+    """Return the (..., 2) gradients of the costs on triangles, for squares of side 1."""
+    legs = np.diff(triangles, axis=-2)
+    return np.asarray((legs[..., 2:] * legs[..., :2]).sum(axis=-2))
+
+
+class Gates(NamedTuple):
+    """Straight pieces of levels, one for each triangle that a level crosses and each way to cross it.
+
+    Attributes:
+        row, column: (n,) of the squares.
+        before, after: (n,) slabs from which and to which they are crossed.
+        cost, left: (n,) cost from the start, and lower bound of that to the goal [m].
+        ends: (n, 2, 2) x, y of both ends [m].
+        heading: (n,) direction in which the cost rises, or falls where they are crossed downwards [rad].
+    """
+
+    row: np.ndarray
+    column: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    cost: np.ndarray
+    left: np.ndarray
+    ends: np.ndarray
+    heading: np.ndarray
+
+    def boxes(self, index: np.ndarray, rows: np.ndarray, widen: float) -> np.ndarray:
+        """Return (n, 11) boxes on gates, as `bounds.py` has them, a little larger than they are.
+
+        Args:
+            index: (n,) of the gates.
+            rows: (n, 5) ranges of the place, from 0 to 1 along a gate, and of the heading, from -1 to 1 for the headings within a
+                right angle of the gate's; potentials [m].
+            widen: lengths that are added for rounding [m].
+        """
+        first, along = self.ends[index, 0], self.ends[index, 1] - self.ends[index, 0]
+        length = np.hypot(*along.T)
+        unit = np.where(length[:, None] > widen, along / np.maximum(length, widen)[:, None], (1.0, 0.0))
+        (place, off), (half, turn) = ((rows[:, 1:4:2] + sign * rows[:, 0:4:2]).T / 2 for sign in (1, -1))
+        return np.column_stack([
+            first + place[:, None] * along, unit, half * length + widen, np.full(len(rows), widen),
+            self.heading[index] + off * HALF_CIRCLE, turn * HALF_CIRCLE, rows[:, 4], self.cost[index], self.left[index]])
+
+
+class Corridor:
+    """The squares that a path may come through and be shorter than the limit of a certificate.
+
+    Attributes:
+        from_start, to_goal: the costs.
+        domain: (rows, columns) mask of the squares that have costs.
+        mask: the same of the corridor.
+        levels: (k,) costs from the start, none of them a node's; slab i is where the costs are from level i - 1 to level i.
+        parts: (k + 1, rows, columns) mask of the corridor's squares that have a part in each slab.
+    """
+
+    def __init__(self, document: dict[str, Any]):
+        grid = document["squares"]
+        self.from_start, self.to_goal = (
+            Squares(np.array(grid["corner"], dtype=float), float(grid["side"]), np.array(document[name], dtype=float))
+            for name in ("from_start", "to_goal"))
+        self.levels = np.array(document["levels"], dtype=float)
+        least, self._left = (squares.corners().min(axis=(2, 3)) for squares in (self.from_start, self.to_goal))
+        self.domain = (np.array([list(row) for row in grid["free"]]) == "1") & ~np.isnan(least + self._left)
+        self.mask = self.domain & (least + self._left < document["limit"])
+        slab = np.arange(len(self.levels) + 1)[:, None, None]
+        self.parts = self.mask & (self.slabs(least) <= slab) & (slab <= self.slabs(self.from_start.corners().max(axis=(2, 3))))
 
     def slabs(self, costs: np.ndarray | float) -> np.ndarray:
         """Return the slabs of costs."""
         return np.asarray(np.searchsorted(self.levels, costs))
 
-    def at(self, x: float, y: float) -> tuple[int, float]:
-        """Return the square that holds a place, and the cost there [m]."""
-        across, up = (x - self.corner[0]) / self.side, (y - self.corner[1]) / self.side
-        column, row = int(across), int(up)
-        across, up, square = across - column, up - row, np.array([row * self.columns + column])
-        c = self.corners(square)
-        if self.is_upward(c)[0]:
-            middle = c[0, 0, 1] if across > up else c[0, 1, 0]
-            first, second = (across, up) if across > up else (up, across)
-            return int(square[0]), float(c[0, 0, 0] + first * (middle - c[0, 0, 0]) + second * (c[0, 1, 1] - middle))
-        one, other = float(c[0, 0, 1]), float(c[0, 1, 0])
-        if across + up < 1:
-            return int(square[0]), float(c[0, 0, 0] * (1 - across - up) + across * one + up * other)
-        return int(square[0]), float(c[0, 1, 1] * (across + up - 1) + (1 - up) * one + (1 - across) * other)
-
-    def within(self, some: np.ndarray, x: float, y: float, reach: float) -> np.ndarray:
-        """Return those of some squares that are within a distance [m] of a place."""
-        row, column = np.divmod(some, self.columns)
-        off_x = np.abs(self.corner[0] + self.side * (column + 0.5) - x) - self.side / 2
-        off_y = np.abs(self.corner[1] + self.side * (row + 0.5) - y) - self.side / 2
-        return some[np.hypot(np.maximum(off_x, 0), np.maximum(off_y, 0)) <= reach]
-
-    def pieces(self, some: np.ndarray) -> Pieces:
-        """Return the pieces of all levels in some squares."""
-        corners = self.corners(some)
-        low, high = self.slabs(corners.min(axis=(1, 2))), self.slabs(corners.max(axis=(1, 2)))
-        index = np.repeat(np.arange(len(some)), high - low)
-        level = np.arange(len(index)) - np.repeat(np.cumsum(high - low) - high, high - low)
-        upward = self.is_upward(corners)[index]
-        found = [self._in_triangle(some[index[mask]], level[mask], number, triangle)
-                 for mask, triangles in ((upward, UPWARD), (~upward, DOWNWARD)) for number, triangle in enumerate(triangles)]
-        return Pieces(*(np.concatenate(column) for column in zip(*found, strict=True)))
-
-    def _in_triangle(self, squares: np.ndarray, level: np.ndarray, number: int, triangle: tuple[tuple[int, int], ...]) -> Pieces:
-        corners = self.corners(squares)
-        values, value = np.stack([corners[:, i, j] for i, j in triangle]), self.levels[level]
-        below = values < value
-        crossed = (below.sum(axis=0) > 0) & (below.sum(axis=0) < 3)
-        values, value, below, squares = values[:, crossed], value[crossed], below[:, crossed], squares[crossed]
-        rows, columns = np.divmod(squares, self.columns)
-        lone = np.where(below.sum(axis=0) == 1, below.argmax(axis=0), below.argmin(axis=0))  # the corner on a side of its own
-        ups, acrosses = np.array(triangle, dtype=float).T
-        each, ends = np.arange(len(lone)), []
-        for other in ((lone + 1) % 3, (lone + 2) % 3):
-            share = (value - values[lone, each]) / (values[other, each] - values[lone, each])
-            ends += [self.corner[0] + self.side * (columns + acrosses[lone] + share * (acrosses[other] - acrosses[lone])),
-                     self.corner[1] + self.side * (rows + ups[lone] + share * (ups[other] - ups[lone]))]
-        legs = np.array([[acrosses[1] - acrosses[0], ups[1] - ups[0]], [acrosses[2] - acrosses[0], ups[2] - ups[0]]])
-        slope = np.linalg.solve(legs, values[1:] - values[0])
-        return Pieces(squares, np.full(len(squares), number), level[crossed], np.stack(ends, axis=1),
-                      np.arctan2(slope[1], slope[0]))
-
-    def neighbours(self, some: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield pairs of squares that share an edge or a node, with the lowest and the highest slab there."""
-        is_some = np.zeros(self.costs.size, bool)
-        is_some[some] = True
-        column = some % self.columns
-        for down, right, nodes in ((0, 1, ((0, 1), (1, 1))), (1, 0, ((1, 0), (1, 1))), (1, 1, ((1, 1),)), (1, -1, ((1, 0),))):
-            inside = (column + right >= 0) & (column + right < self.columns)
-            one = some[inside][is_some[some[inside] + down * self.columns + right]]
-            values = np.stack([self.corners(one)[:, i, j] for i, j in nodes])
-            yield one, one + down * self.columns + right, self.slabs(values.min(axis=0)), self.slabs(values.max(axis=0))
-
-
-def squared_slopes(corners: np.ndarray, triangles: tuple[tuple[tuple[int, int], ...], ...]) -> np.ndarray:
-    """Return the squared slope of the steeper triangle of each square, for squares of side 1."""
-    steepest = np.zeros(len(corners))
-    for (i, j), (k, m), (n, o) in triangles:
-        # Two of the three edges are sides of the square, at a right angle.
-        first, second, third = corners[:, i, j], corners[:, k, m], corners[:, n, o]
-        one = second - first
-        two = third - (second if abs(k - n) + abs(m - o) == 1 else first)
-        steepest = np.maximum(steepest, one**2 + two**2)
-    return steepest
+    def gates(self) -> Gates:
+        """Return all gates in the corridor."""
+        row, column = np.nonzero(self.mask)
+        triangles, found = self.from_start.triangles(row, column), []
+        for level, cost in enumerate(self.levels):
+            is_below = triangles[..., 2] < cost
+            square, half = np.nonzero(is_below.any(axis=2) & ~is_below.all(axis=2))
+            corners, is_below, each = triangles[square, half], is_below[square, half], np.arange(len(square))
+            lone = (is_below == (is_below.sum(axis=1, keepdims=True) == 1)).argmax(axis=1)  # the corner on a side of its own
+            first, others = corners[each, lone, None], np.stack([corners[each, (lone + i) % 3] for i in (1, 2)], axis=1)
+            share = (cost - first[..., 2:]) / (others - first)[..., 2:]
+            ends = self.from_start.corner + self.from_start.side * (first + share * (others - first))[..., :2]
+            rising = np.arctan2(*gradients(corners).T[::-1])
+            place, left = (row[square], column[square]), self._left[row[square], column[square]]
+            found += [(*place, each * 0 + level + way, each * 0 + level + 1 - way, each * 0 + cost, left, ends, rising + way * np.pi)
+                      for way in (0, 1)]
+        return Gates(*(np.concatenate(field) for field in zip(*found, strict=True)))

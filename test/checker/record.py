@@ -77,7 +77,8 @@ def main():
         for title, problem, file, gap in problems(Path(name)):
             found = certified(problem, file, gap, seconds=10.0)
             document = found.document
-            print(title, f"{len(document['levels'])} levels, {len(document['boxes'])} boxes, {document['length']:.4f} m, "
+            boxes = sum(map(len, document["boxes"]))
+            print(title, f"{len(document['levels'])} levels, {boxes} boxes, {document['length']:.4f} m, "
                   f"bound {document['bound']:.4f} m", refusal(found, Path(name)) or "holds")
             write_certificate(RECORDED / f"{title}.cert", document)
             if file.suffix == ".yaml":

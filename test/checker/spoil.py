@@ -37,7 +37,7 @@ def main():
             if certified is None:
                 continue
             made += 1
-            boxes.append(len(certified.document["boxes"]))
+            boxes.append(sum(map(len, certified.document["boxes"])))
             if said := refusal(certified, folder):
                 wrong.append(f"seed {seed}: a certificate is refused: {said}")
             for kind, spoil in SPOILS.items():

@@ -11,6 +11,7 @@ from support.certificates import Certified, certified, hall, pose_in, recorded, 
 from support.spoils import SPOILS, Drive
 
 from dubins_rrt_ros.checker.check import Refused, check, goal_boxes
+from dubins_rrt_ros.checker.levels import Corridor
 from dubins_rrt_ros.checker.maps import UnreadableMap
 from dubins_rrt_ros.planning import Problem, Vehicle
 from dubins_rrt_ros.planning.certificate.certificate import CertificateError, write_certificate
@@ -43,7 +44,7 @@ def test_a_certificate_is_accepted_and_its_claim_is_told(tmp_path):
     claim = check(tmp_path / "path.cert", made.file)
     assert claim == {name: made.document[name] for name in ("request", "length", "bound")}
     assert claim["bound"] <= claim["length"] <= 1.05 * claim["bound"]
-    assert len(made.document["levels"]) >= 1 and len(made.document["boxes"]) > 10
+    assert len(made.document["levels"]) >= 1 and sum(map(len, made.document["boxes"])) > 10
 
 
 def test_plain_json_will_do(tmp_path):
@@ -67,7 +68,7 @@ def test_another_map_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("field", "value", "said"), [
     ("length", 1.0, "the path is "), ("path", [], "beyond the goal's tolerance"),
-    ("limit", 1.0, "the corridor is too narrow"), ("cells", [], "the cells do not fit")])
+    ("limit", 1.0, "the corridor is too narrow"), ("boxes", [], "the boxes do not fit")])
 def test_each_part_of_the_claim_is_looked_at(field, value, said, tmp_path):
     assert said in verdict(tmp_path, **{field: value})
 
@@ -97,8 +98,38 @@ def test_boxes_of_the_goal_cover_where_it_is_reached_and_little_more(tolerance, 
 def test_a_start_on_a_level_is_refused(tmp_path):
     """It would be in two cells."""
     drive = Drive.of(TURNED)
-    levels = [drive.from_start.at(*drive.poses[0, :2])[1] + 1e-9, *TURNED.document["levels"]]
-    assert verdict(tmp_path, levels=levels) == "the start is not inside a slab"
+    levels = [drive.corridor.from_start.at(*drive.poses[0, :2])[1] + 1e-9, *TURNED.document["levels"]]
+    parts = Corridor(TURNED.document | {"levels": levels}).parts
+    cells = np.nonzero(parts)[0].tolist()  # one for each slab
+    assert verdict(tmp_path, levels=levels, cells=cells) == "an end is not inside a slab"
+
+
+def test_a_start_outside_of_all_squares_is_refused(tmp_path):
+    """Rows are not counted from the other end: squares somewhere else prove nothing of this start."""
+    squares = TURNED.document["squares"]
+    for axis in (0, 1):
+        corner = list(squares["corner"])
+        corner[axis] += squares["side"] * (len(squares["free"]), len(squares["free"][0]))[1 - axis]
+        assert "outside of all squares" in verdict(tmp_path, squares=squares | {"corner": corner})
+
+
+def test_boxes_that_reach_beyond_their_gates_are_refused(tmp_path):
+    """The middle of one that reaches too far is no number, of which nothing would be shown."""
+    boxes = [[[-1e308, 1e308, -1, 1, 9.0]] if some else [] for some in TURNED.document["boxes"]]
+    assert "do not cover" in verdict(tmp_path, boxes=boxes)
+
+
+@pytest.mark.parametrize("number", ["1e999", "-Infinity", "NaN"])
+def test_what_is_no_number_is_refused(number, tmp_path):
+    (tmp_path / "path.cert").write_text(json.dumps(TURNED.document | {"limit": 777.25}).replace("777.25", number))
+    with pytest.raises(Refused, match="is no number"):
+        check(tmp_path / "path.cert", TURNED.file)
+
+
+@pytest.mark.parametrize("cells", [[], [0], None])
+def test_cells_have_to_fit(cells, tmp_path):
+    negative = [-1 for _ in TURNED.document["cells"]]
+    assert "cells do not fit" in verdict(tmp_path, cells=negative if cells is None else cells)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dubins_rrt_ros.checker.levels import HALF_CIRCLE, Squares
+from dubins_rrt_ros.checker.levels import HALF_CIRCLE, Corridor
 from dubins_rrt_ros.checker.maps import read_map
 from dubins_rrt_ros.planning import GridMap, Problem, Vehicle, load_map, plan
 from dubins_rrt_ros.planning.audit import audit_path
@@ -21,10 +21,15 @@ STEP = 0.01
 
 
 class Crossing(NamedTuple):
-    """Where a path crosses a box: the box's row, and the length of the path up to there [m]."""
+    """Where a path crosses a box: the gate, the box's row there, and the length of the path up to there [m]."""
 
-    box: int
+    gate: int
+    row: int
     along: float
+
+    def box(self, document):
+        """The box in a certificate."""
+        return document["boxes"][self.gate][self.row]
 
 
 class Drive:
@@ -45,25 +50,16 @@ class Drive:
         self.document = certified.document
         self.world = read_map(certified.file, self.document["map"]["allow_unknown"])
         self.poses, self.along = _driven(self.document, self.world)
-        grid = self.document["squares"]
-        place = tuple(grid["corner"]), grid["side"]
-        self.levels = np.array(self.document["levels"])
-        self.from_start, self.to_goal = (Squares(*place, np.array(self.document[name], dtype=float), levels)
-                                         for name, levels in (("from_start", self.levels), ("to_goal", self.levels[:0])))
 
+    @cached_property
     def corridor(self):
-        """The squares of the corridor, ascending."""
-        has = ~np.isnan(self.from_start.costs) & ~np.isnan(self.to_goal.costs)
-        free = np.array([[letter == "1" for letter in row] for row in self.document["squares"]["free"]])
-        full = free & has[:-1, :-1] & has[1:, :-1] & has[:-1, 1:] & has[1:, 1:]
-        domain = np.flatnonzero(full)
-        least = sum(squares.corners(domain).min(axis=(1, 2)) for squares in (self.from_start, self.to_goal))
-        return domain[least < self.document["limit"]]
+        """The corridor, where there are levels."""
+        return Corridor(self.document)
 
     def squares(self):
-        """The squares and slabs in which the poses are."""
-        found = [self.from_start.at(x, y) for x, y, _ in self.poses.tolist()]
-        return np.array([square for square, _ in found]), self.from_start.slabs(np.array([cost for _, cost in found]))
+        """The rows, columns and slabs of the poses."""
+        found = [self.corridor.from_start.at(x, y) for x, y, _ in self.poses.tolist()]
+        return np.column_stack([[square for square, _ in found], self.corridor.slabs(np.array([cost for _, cost in found]))])
 
     def crossings(self):
         """The crossings of the boxes, in their order; none where a level is crossed more than once."""
@@ -73,30 +69,26 @@ class Drive:
     def _crossings(self):
         if not self.document["levels"]:
             return []
-        pieces, found = self.from_start.pieces(self.corridor()), []
-        number = {name: index for index, name in enumerate(zip(*(part.tolist() for part in pieces[:3]), strict=True))}
+        gates, found = self.corridor.gates(), []
         before, after = self.poses[:-1, None, :2], self.poses[1:, None, :2]
-        across = np.stack([np.cos(pieces.rising), np.sin(pieces.rising)], axis=1)
-        height = [((points - pieces.ends[:, :2]) * across).sum(axis=2) for points in (before, after)]
-        along = pieces.ends[:, 2:] - pieces.ends[:, :2]
-        share = ((before - pieces.ends[:, :2]) * along).sum(axis=2) / (along**2).sum(axis=1)
-        crossed = (np.sign(height[0]) != np.sign(height[1])) & (share >= 0) & (share <= 1)
-        for pose, piece in zip(*np.nonzero(crossed), strict=True):
-            way = 1 if height[1][pose, piece] > height[0][pose, piece] else -1
-            off = math.remainder(self.poses[pose, 2] - pieces.rising[piece] - (way < 0) * math.pi, math.tau) / HALF_CIRCLE
-            found += [Crossing(row, float(self.along[pose + 1])) for row, box in enumerate(self.document["boxes"])
-                      if number[tuple(map(int, box[:3]))] == piece and box[3] == way
-                      and box[4] + 0.01 < share[pose, piece] < box[5] - 0.01 and box[6] <= off <= box[7]]
-        levels = [self.document["boxes"][crossing.box][2] for crossing in found]
+        first, along = gates.ends[:, 0], gates.ends[:, 1] - gates.ends[:, 0]
+        onward = np.stack([np.cos(gates.heading), np.sin(gates.heading)], axis=1)
+        height = [((points - first) * onward).sum(axis=2) for points in (before, after)]
+        share = ((before - first) * along).sum(axis=2) / (along**2).sum(axis=1)
+        crossed = (height[0] < 0) & (height[1] >= 0) & (share >= 0) & (share <= 1)
+        for pose, gate in zip(*(index.tolist() for index in np.nonzero(crossed)), strict=True):
+            off = math.remainder(self.poses[pose, 2] - gates.heading[gate], math.tau) / HALF_CIRCLE
+            found += [Crossing(gate, row, float(self.along[pose + 1])) for row, box in enumerate(self.document["boxes"][gate])
+                      if box[0] + 0.01 < share[pose, gate] < box[1] - 0.01 and box[2] <= off <= box[3]]
+        levels = [gates.cost[crossing.gate] for crossing in found]
         return found if levels == sorted(set(levels)) else []
 
     def open_crossings(self):
         """The crossings before which all boxes that are crossed leave a path the chance to be short enough."""
         for crossing in self.crossings():
             yield crossing
-            row = self.document["boxes"][crossing.box]
-            left = self.to_goal.corners(np.array([int(row[0])])).min()
-            if row[8] is None or row[8] + left >= self.document["bound"]:
+            potential = crossing.box(self.document)[4]
+            if potential is None or potential + self.corridor.gates().left[crossing.gate] >= self.document["bound"]:
                 return
 
 
@@ -132,72 +124,66 @@ def _bound_above_the_path(certified, rng, folder):
 
 def _raised_potential(certified, rng, folder):
     """The potential of a box that the path crosses, raised above what the path has behind it there."""
-    found = [crossing for crossing in Drive.of(certified).open_crossings()
-             if certified.document["boxes"][crossing.box][8] is not None]
+    found = [crossing for crossing in Drive.of(certified).open_crossings() if crossing.box(certified.document)[4] is not None]
     if not found:
         return None
     crossing = found[rng.integers(len(found))]
 
     def change(document):
-        document["boxes"][crossing.box][8] = 1.0001 * crossing.along
+        crossing.box(document)[4] = 1.0001 * crossing.along
     return _with(certified, change)
 
 
 def _raised_potentials(certified, rng, folder):
     """All potentials on a level, raised by a thousandth of the bound."""
-    if not certified.document["boxes"]:
+    if not any(certified.document["boxes"]):
         return None
-    level = certified.document["boxes"][rng.integers(len(certified.document["boxes"]))][2]
+    costs = Drive.of(certified).corridor.gates().cost
+    level = rng.choice([cost for cost, boxes in zip(costs, certified.document["boxes"], strict=True) if boxes])
 
     def change(document):
-        for row in document["boxes"]:
-            if row[2] == level and row[8] is not None:
-                row[8] += 0.001 * document["bound"]
+        for gate in np.flatnonzero(costs == level):
+            for box in document["boxes"][gate]:
+                box[4] = None if box[4] is None else box[4] + 0.001 * document["bound"]
     return _with(certified, change)
 
 
-def _on_path(certified, rng):
-    """The row of a box that the path crosses, or None."""
+def _on_path(certified, rng, change):
+    """The certificate after a change of a gate's boxes, of which the path crosses that of a row; None where it crosses none."""
     found = Drive.of(certified).crossings()
-    return found[rng.integers(len(found))].box if found else None
+    if not found:
+        return None
+    crossing = found[rng.integers(len(found))]
+    return _with(certified, lambda document: change(document["boxes"][crossing.gate], crossing.row))
 
 
 def _dropped_box(certified, rng, folder):
-    row = _on_path(certified, rng)
-    return None if row is None else _with(certified, lambda document: document["boxes"].pop(row))
+    return _on_path(certified, rng, lambda boxes, row: boxes.pop(row))
 
 
 def _shortened_box(certified, rng, folder):
     """A box that the path crosses, without a thousandth at one of its ends."""
-    row = _on_path(certified, rng)
-    if row is None:
-        return None
-    end = 4 + int(rng.integers(4))
-
-    def change(document):
-        document["boxes"][row][end] += (-0.001, 0.001)[end % 2 == 0]
-    return _with(certified, change)
+    def change(boxes, row):
+        end = int(rng.integers(4))
+        boxes[row][end] += (-0.001, 0.001)[end % 2 == 0]
+    return _on_path(certified, rng, change)
 
 
 def _closed_box(certified, rng, folder):
     """A box that the path crosses, said to hold no free place."""
-    row = _on_path(certified, rng)
-
-    def change(document):
-        document["boxes"][row][8] = None
-    return None if row is None else _with(certified, change)
+    def change(boxes, row):
+        boxes[row][4] = None
+    return _on_path(certified, rng, change)
 
 
 def _left_out_square(certified, rng, folder):
     """The corridor leaks: a square that the path leads through is left out."""
     if not certified.document["levels"]:
         return None
-    squares, _ = Drive.of(certified).squares()
-    square = int(squares[rng.integers(len(squares))])
+    up, across, _ = rng.choice(Drive.of(certified).squares())
 
     def change(document):
         free = document["squares"]["free"]
-        up, across = divmod(square, len(free[0]))
         free[up] = free[up][:across] + "0" + free[up][across + 1:]
     return _with(certified, change)
 
@@ -207,16 +193,15 @@ def _parted_cell(certified, rng, folder):
     if not certified.document["levels"]:
         return None
     drive = Drive.of(certified)
-    squares, slabs = drive.squares()
-    steps = np.flatnonzero((squares[1:] != squares[:-1]) & (slabs[1:] == slabs[:-1]))
+    parts = drive.squares()
+    steps = np.flatnonzero((parts[1:, :2] != parts[:-1, :2]).any(axis=1) & (parts[1:, 2] == parts[:-1, 2]))
     if not len(steps):
         return None
-    step = steps[rng.integers(len(steps))]
-    row = int(np.flatnonzero(drive.corridor() == squares[step])[0])
-    low = int(drive.from_start.slabs(drive.from_start.corners(squares[[step]]).min()))
+    row, column, slab = parts[rng.choice(steps)]
+    numbers = np.cumsum(drive.corridor.parts).reshape(drive.corridor.parts.shape) - 1
 
     def change(document):
-        document["cells"][row][int(slabs[step]) - low] = 1_000_000
+        document["cells"][numbers[slab, row, column]] = 1_000_000
     return _with(certified, change)
 
 
@@ -233,16 +218,16 @@ def _swapped_levels(certified, rng, folder):
 def _swapped_potentials(certified, rng, folder):
     """The potentials of two boxes that the path crosses one after the other."""
     found = list(Drive.of(certified).open_crossings())
-    boxes = certified.document["boxes"]
     pairs = [(one, other) for one, other in pairwise(found)
-             if None not in (boxes[one.box][8], boxes[other.box][8]) and boxes[other.box][8] > 1.0001 * one.along]
+             if None not in (potentials := [crossing.box(certified.document)[4] for crossing in (one, other)])
+             and potentials[1] > 1.0001 * one.along]
     if not pairs:
         return None
     one, other = pairs[rng.integers(len(pairs))]
 
     def change(document):
-        row, following = document["boxes"][one.box], document["boxes"][other.box]
-        row[8], following[8] = following[8], row[8]
+        box, following = one.box(document), other.box(document)
+        box[4], following[4] = following[4], box[4]
     return _with(certified, change)
 
 
@@ -279,9 +264,7 @@ def _raised_node(certified, rng, folder):
     """A cost to the goal beside the path, raised by more than that of two places across a square can differ."""
     if not certified.document["levels"]:
         return None
-    drive = Drive.of(certified)
-    squares, _ = drive.squares()
-    row, column = divmod(int(squares[rng.integers(len(squares))]), drive.from_start.columns)
+    row, column, _ = rng.choice(Drive.of(certified).squares())
 
     def change(document):
         document["to_goal"][row][column] += 2.5 * document["squares"]["side"]

@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import math
 import time
 from collections.abc import Callable
 from pathlib import Path as File
@@ -10,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import shapely
+from scipy import ndimage
 
 from ...checker.bounds import too_high
 from ...checker.check import MARGIN, goal_boxes, inner_radius, pose_box, used_portals
-from ...checker.levels import Squares
+from ...checker.levels import Corridor
 from ...checker.maps import UnreadableMap, digest_of_cells, read_map
 from ...checker.maps import World as CheckedMap
 from .._kernels import UNLIMITED
@@ -25,7 +25,6 @@ from ..maps.model import GridMap
 from ..problem import Problem
 from ..proof.length_proof import GAPS, LengthProof
 from .bisection import Bisection
-from .cells import Cells
 from .cover import Cover, Ends
 from .potentials import Potentials
 
@@ -33,6 +32,8 @@ from .potentials import Potentials
 SLACK = 1e-8
 #: Share of the time for the choice of levels.
 LEVELS_SHARE = 0.2
+#: What stands for the cell where a square has no part in a slab.
+NONE = -1
 
 
 class CertificateError(PlanningError, ValueError):
@@ -94,7 +95,7 @@ def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str,
     start, goal = (world.own(request[name]) for name in ("start", "goal"))
     goals = goal_boxes(goal, request["goal_tolerance_xy"], request["goal_tolerance_yaw"], length)
     margin = 2 * MARGIN * (length + world.size)
-    box = pose_box(*start, 0.0, 0.0, 0.0, math.nan)
+    box = pose_box(*start)
     bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
     return {"bound": max(0.0, bound), "limit": length, "levels": [], "cells": [], "boxes": [],
             "squares": {"corner": [0, 0], "side": 1, "free": []}, "from_start": [], "to_goal": []}
@@ -126,14 +127,14 @@ class _Draft:
         levels = proof.levels if len(proof.levels) else np.array([sets.end / 2])
         while np.isin(levels, from_start).any():
             levels = np.where(np.isin(levels, from_start), np.nextafter(levels, 0), levels)
-        self._squares = Squares((-side, -side), side, from_start, levels)
-        self._to_goal = Squares((-side, -side), side, to_goal, levels[:0])
-        self._free = free
-        domain = np.flatnonzero(free)
-        least = sum(squares.corners(domain).min(axis=(1, 2)) for squares in (self._squares, self._to_goal))
-        self._limit = self._length * (1 + 1e-6) + 2 * side
-        self._corridor = domain[least < self._limit]
-        self._cells = Cells(self._squares, self._corridor)
+        self._document: dict[str, Any] = {
+            "limit": self._length * (1 + 1e-6) + 2 * side, "levels": levels.tolist(),
+            "squares": {"corner": [-side, -side], "side": side,
+                        "free": ["".join("01"[is_free] for is_free in row) for row in free.tolist()]},
+            "from_start": _rows(from_start), "to_goal": _rows(to_goal)}
+        self._corridor = Corridor(self._document)
+        self._cells = _labelled(self._corridor.parts)
+        self._margin = MARGIN * (self._document["limit"] + world.size)
 
     def proved(self, gap: float, bound: float, is_over: Callable[[], bool]) -> dict[str, Any] | None:
         """Return the fields of the proof with the greatest bound that there is time for, if it is above `bound` [m].
@@ -157,38 +158,48 @@ class _Draft:
                 bound, boxes = potentials.bound, cover.document(potentials.values)
             if bisection.bound < target:
                 break
-        return None if boxes is None else {
-            "bound": bound, "limit": self._limit,
-            "squares": {"corner": list(self._squares.corner), "side": self._squares.side,
-                        "free": ["".join("01"[is_free] for is_free in row) for row in self._free.tolist()]},
-            "from_start": _rows(self._squares.costs), "to_goal": _rows(self._to_goal.costs),
-            "levels": self._squares.levels.tolist(), "cells": self._cells.of_squares(), "boxes": boxes}
+        cells = self._cells[self._corridor.parts].tolist()
+        return None if boxes is None else self._document | {"bound": bound, "cells": cells, "boxes": boxes}
 
     def _cover(self) -> Cover:
-        pieces = self._squares.pieces(self._corridor)
-        below, above = (self._cells.at(pieces.square, pieces.level + i).tolist() for i in (0, 1))
-        keys = list(zip(below, above, strict=True)), list(zip(above, below, strict=True))
-        ends = self._ends()
-        limits = np.column_stack([self._squares.levels[pieces.level], self._to_goal.corners(pieces.square).min(axis=(1, 2))])
-        return Cover(pieces, keys, used_portals({*keys[0], *keys[1]}, ends.start_cell, ends.goal_cells), ends, limits,
-                     self._is_blocked, MARGIN * (self._limit + self._world.size))
+        gates, ends = self._corridor.gates(), self._ends()
+        before, after = (self._cells[slab, gates.row, gates.column].tolist() for slab in (gates.before, gates.after))
+        keys = list(zip(before, after, strict=True))
+        return Cover(gates, keys, used_portals(set(keys), ends.start_cell, ends.goal_cells), ends, self._is_blocked, self._margin)
 
     def _ends(self) -> Ends:
         start, goal = (self._world.own(self._request[name]) for name in ("start", "goal"))
-        square, cost = self._squares.at(*start[:2])
-        start_cell = int(self._cells.at(square, self._squares.slabs(cost)))
-        tolerance = self._request["goal_tolerance_xy"]
+        start_cell, cost = self._cell_at(start)
+        tolerance, to_goal = self._request["goal_tolerance_xy"], self._corridor.to_goal
         goals = goal_boxes(goal, tolerance, self._request["goal_tolerance_yaw"], 0.0)
         if tolerance == 0:
-            square, goals[:, 9] = self._squares.at(*goal[:2])
-            cells, excess = {int(self._cells.at(square, self._squares.slabs(goals[0, 9])))}, self._to_goal.at(*goal[:2])[1]
+            goal_cell, goals[:, 9] = self._cell_at(goal)
+            cells, excess = {goal_cell}, to_goal.at(*goal[:2])[1]
         else:
-            near = self._squares.within(self._corridor, *goal[:2], tolerance + 1e-6)
-            cells, excess = self._cells.of(near), float(self._to_goal.corners(near).max())
-        return Ends(pose_box(*start, 0.0, 0.0, 0.0, cost), goals, start_cell, cells, max(0.0, excess))
+            near = to_goal.near(*goal[:2], tolerance + 2 * self._margin)
+            cells = set(self._cells[:, near].ravel().tolist()) - {NONE}
+            excess = float(to_goal.corners()[near & self._corridor.domain].max())
+        start_box = pose_box(*start)
+        start_box[:, 9] = cost
+        return Ends(start_box, goals, start_cell, cells, max(0.0, excess))
+
+    def _cell_at(self, pose: tuple[float, float, float]) -> tuple[int, float]:
+        """Return the cell of a place, and its cost from the start [m]."""
+        square, cost = self._corridor.from_start.at(*pose[:2])
+        return int(self._cells[int(self._corridor.slabs(cost)), *square]), cost
 
     def _is_blocked(self, boxes: np.ndarray) -> np.ndarray:
         return self._world.clearances(boxes[:, :2], self._inner) + boxes[:, 4] * (1 + 1e-9) + 1e-9 < self._inner
+
+
+def _labelled(parts: np.ndarray) -> np.ndarray:
+    """Return the cell of each part of a square in a slab: those that touch within a slab hang together; NONE elsewhere."""
+    cells, count = np.full(parts.shape, NONE), 0
+    for some, mask in zip(cells, parts, strict=True):
+        labels, found = ndimage.label(mask, np.ones((3, 3)))
+        some[mask] = labels[mask] + count
+        count += found
+    return cells
 
 
 def write_certificate(file: str | File, document: dict[str, Any]) -> None:
