@@ -137,7 +137,8 @@ class Corridor:
             share = (cost - first[..., 2:]) / (others - first)[..., 2:]
             ends = self.from_start.corner + self.from_start.side * (first + share * (others - first))[..., :2]
             rising = np.arctan2(*gradients(corners).T[::-1])
-            place, left = (row[square], column[square]), self._left[row[square], column[square]]
-            found += [(*place, each * 0 + level + way, each * 0 + level + 1 - way, each * 0 + cost, left, ends, rising + way * np.pi)
-                      for way in (0, 1)]
+            place = row[square], column[square]
+            for before, after, heading in ((level, level + 1, rising), (level + 1, level, rising + np.pi)):
+                same = (np.full(len(each), value) for value in (before, after, cost))
+                found.append((*place, *same, self._left[place], ends, heading))
         return Gates(*(np.concatenate(field) for field in zip(*found, strict=True)))

@@ -15,7 +15,7 @@ def random_boxes(rng, count, size=1.0):
     """Boxes within some metres, of any direction, their sizes drawn from 0 to `size`."""
     angle, share = rng.uniform(-np.pi, np.pi, count), rng.random((3, count)) * (rng.random((3, count)) < 0.8)
     return np.column_stack([*rng.uniform(-3, 3, (2, count)), np.cos(angle), np.sin(angle), size * share[0], size * share[1],
-                            rng.uniform(-4, 4, count), size * share[2]])
+                            rng.uniform(-4, 4, count), size * share[2], *np.zeros((3, count))])
 
 
 def poses_in(boxes, rng):
