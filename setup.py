@@ -80,7 +80,7 @@ setup(
         installed("maps", "maps/*"),
         installed("config", "config/*"),
         installed("launch", "launch/*"),
-        installed("examples", "examples/*"),
+        installed("examples", "examples/*.*"),
         # A wheel ignores setup.cfg's install_scripts, so that `ros2 run` would find nothing after `pip install`.
         (f"lib/{PACKAGE}", ["resource/planner", "resource/dubins_rrt_planner", "resource/dubins_rrt"]),
     ],

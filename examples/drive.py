@@ -5,133 +5,109 @@
 
 The car follows `plan` by pure pursuit, with noise in its pose and lag in its steering. It is planned for with a radius 0.1 m
 larger than its body. One line of JSON tells of each goal, and a last one of the whole drive; a judge that is not the planner
-measures, from true poses, how near the body came to what was on the map. `standstill` is the longest time without a path while
-nobody was near the car or where it is to go, `without_path` that in all cases. The exit status is 1 if it touched anything or
-reached no goal.
+measures, from true poses, how near the body came to what was on the map. `without_path` is the longest time without a path,
+`standstill` the longest in which the map that the planner had shows a way: that is planned again after the drive, with
+JUDGING_TIME for each map; so people in the only way count for nothing, wherever they stand. The exit status is 1 if the car
+touched anything, reached no goal, or stood still for longer than MOST_STANDSTILL.
 """
 
 import argparse
 import json
 import math
+import os
 import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
+from floor import BODY, NO_ROOM, PERSON, Floor
 from geometry_msgs.msg import PoseArray, PoseStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from scipy.ndimage import distance_transform_edt
 
 from dubins_rrt_ros.cli.demo.process import planner_command
 from dubins_rrt_ros.node.conversions import grid_message, pose_message
-from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan, plan_through
 from dubins_rrt_ros.planning.maps.locate import find_map
 
-BODY, MARGIN, TURNING_RADIUS = 0.2, 0.1, 1.0
+MARGIN, TURNING_RADIUS = 0.1, 1.0
 #: What the car can do: its speed [m/s], its curvature [1/m], and the time constant of its steering [s].
 SPEED, MOST_CURVATURE, STEERING_LAG = 0.7, 1.25, 0.1
 #: Distance along the path at which it is steered [m], and the standard deviations of its pose [m, rad].
 LOOKAHEAD, NOISE_XY, NOISE_YAW = 0.5, 0.01, 0.01
 #: Period of the simulation, of poses and of maps [s].
 STEP, POSE_PERIOD, MAP_PERIOD = 0.02, 0.05, 0.5
-#: Of people: their number, radius [m], speed [m/s], how near to a car they turn back, and how far a car sees them [m].
-PEOPLE, PERSON, WALK, SHY, SIGHT = 3, 0.2, 0.6, 1.2, 6.0
 #: Number of poses of the path that a driver looks ahead, and where a car has the right of way.
 LOOK, LOOK_FOR_CARS = 25, 60
-#: Number of wrong cells in each map.
-SPECKLE = 2
 #: Maximum number of places that are tried for a goal.
 MOST_TRIES = 50
 #: Within this of the goal it is reached [m, rad]; a goal is given up after this time [s].
 REACHED_XY, REACHED_YAW, PATIENCE = 0.25, 0.5, 180.0
-#: Somebody who is so near to a car, a waypoint or the goal may leave no arc from it or to it [m].
-NEARBY = 1.5
+#: Time in which the judge looks for a path on a map without one, and the longest that a car may wait for its planner [s].
+JUDGING_TIME, MOST_STANDSTILL = 3.0, 1.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {"robot_radius": BODY + MARGIN, "turning_radius": TURNING_RADIUS, "replan_on_map_change": True, "replan_rate": 2.0,
               "start_slack": MARGIN, "samples": 500, "planning_time": 1.0,
               "goal_tolerance_xy": 0.6 * REACHED_XY, "goal_tolerance_yaw": 0.6 * REACHED_YAW}
 
 
+class View(NamedTuple):
+    """What a planner knew at a time: seconds since the path was lost, the map, its pose, and where it is still to go to."""
+
+    seconds: float
+    grid: GridMap
+    pose: tuple
+    places: list[tuple]
+
+
 @dataclass
-class Floor:
-    """What is really there: walls, and people who walk.
+class Wait:
+    """A time without a path.
 
     Attributes:
-        grid: the walls.
-        distance: of each cell to the nearest wall [m].
-        people: (n, 4) x, y [m] and their velocity [m/s].
+        result: of the goal that was driven to.
+        begin: when it began, by the clock of logs [s].
+        seconds: how long it took [s].
+        views: from its begin on, one for each map.
     """
 
-    grid: GridMap
-    rng: np.random.Generator
-    distance: np.ndarray = field(init=False)
-    people: np.ndarray = field(init=False)
+    result: dict
+    begin: float = field(default_factory=time.time)
+    seconds: float = 0.0
+    views: list[View] = field(default_factory=list)
 
-    def __post_init__(self):
-        free = self.grid.data < 25
-        self.distance = distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * self.grid.resolution
-        self.people = np.array([[*self.random_place(0.5), 0.0, 0.0] for _ in range(PEOPLE)])
+    def judged(self) -> dict:
+        """Return it with the longest time in it for which the maps showed a way [s]."""
+        longest = stood = 0.0
+        for view, end in zip(self.views, [*(view.seconds for view in self.views[1:]), self.seconds], strict=True):
+            stood = stood + end - view.seconds if shows_way(view) else 0.0
+            longest = max(longest, stood)
+        pose, *places = ([round(float(a), 3) for a in place] for place in (self.views[0].pose, *self.views[0].places))
+        return {"car": self.result["car"], "begin": round(self.begin, 3), "pose": pose, "places": places,
+                "without_path": round(self.seconds, 3), "standstill": round(longest, 3)}
 
-    def random_place(self, room: float) -> tuple[float, float]:
-        """Return a place that is so far from all walls [m]."""
-        rows, columns = np.nonzero(self.distance >= room)
-        pick = self.rng.integers(len(rows))
-        x, y = self.grid.origin[:2]
-        return x + (columns[pick] + 0.5) * self.grid.resolution, y + (rows[pick] + 0.5) * self.grid.resolution
 
-    def room(self, x: float, y: float) -> float:
-        """Return the distance of a point to the nearest wall, to within a cell [m]."""
-        column, row = (int((a - b) / self.grid.resolution) for a, b in zip((x, y), self.grid.origin[:2], strict=True))
-        height, width = self.distance.shape
-        return self.distance[row, column] if 0 <= row < height and 0 <= column < width else 0.0
-
-    def walk(self, seconds: float, cars: list[np.ndarray]) -> None:
-        """Let people walk on; they turn at walls, and away from cars."""
-        for person in self.people:
-            near = [car for car in cars if math.dist(car[:2], person[:2]) < SHY]
-            if not self._step(person, seconds, near) or not person[2:].any():
-                away = math.atan2(*(person[:2] - near[0][:2])[::-1]) if near else self.rng.uniform(-math.pi, math.pi)
-                angle = away + self.rng.uniform(-1.0, 1.0)
-                person[2:] = WALK * math.cos(angle), WALK * math.sin(angle)
-
-    def _step(self, person: np.ndarray, seconds: float, near: list[np.ndarray]) -> bool:
-        """Let a person take a step where no wall is, and no car comes nearer by it; return True if so."""
-        x, y = person[:2] + seconds * person[2:]
-        if self.room(x, y) < 0.35 or any(math.dist(car[:2], (x, y)) < math.dist(car[:2], person[:2]) for car in near):
-            return False
-        person[:2] = x, y
-        return True
-
-    def seen(self, car: np.ndarray, others: list[np.ndarray]) -> GridMap:
-        """Return the map as a car has it: walls, people and other cars in sight, and wrong cells."""
-        cells = self.grid.data.copy()
-        height, width = cells.shape
-        x = self.grid.origin[0] + (np.arange(width) + 0.5) * self.grid.resolution
-        y = self.grid.origin[1] + (np.arange(height) + 0.5) * self.grid.resolution
-        reach = self.grid.resolution * math.sqrt(0.5)  # to whose middle a cell that is touched reaches
-        discs = [(*person[:2], PERSON + reach) for person in self.people] + [(*other[:2], BODY + reach) for other in others]
-        for px, py, radius in discs:
-            if math.dist((px, py), car[:2]) < SIGHT:
-                cells[np.hypot(x[None, :] - px, y[:, None] - py) < radius] = 100
-        cells[self.rng.integers(height, size=SPECKLE), self.rng.integers(width, size=SPECKLE)] = 100
-        return GridMap(cells, self.grid.resolution, self.grid.origin, self.grid.name, percent=True)
+def shows_way(view: View) -> bool:
+    """Return True if a way leads over all places."""
+    *waypoints, goal = view.places
+    problem = Problem(view.grid, Vehicle(TURNING_RADIUS, BODY + MARGIN), view.pose, goal, start_slack=MARGIN,
+                      goal_tolerance_xy=PARAMETERS["goal_tolerance_xy"], goal_tolerance_yaw=PARAMETERS["goal_tolerance_yaw"])
+    return plan_through(problem, waypoints, Settings(planner="rrt", planning_time=JUDGING_TIME, seed=1)).solved
 
 
 class Car:
     """A car with a planner of its own, in a namespace of its own."""
 
-    def __init__(self, number: int, floor: Floor, executor: SingleThreadedExecutor, rng: np.random.Generator):
+    def __init__(self, number: int, floor: Floor, executor: SingleThreadedExecutor, rng: np.random.Generator, log: Path | None):
         self._number, self._floor, self._rng = number, floor, rng
         self.namespace = f"/car{number}"
-        rules = [part for name, value in PARAMETERS.items() for part in ("-p", f"{name}:={json.dumps(value)}")]
-        self.planner = subprocess.Popen([*planner_command(), "--ros-args", "-r", f"__ns:={self.namespace}", *rules],
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
         node = rclpy.create_node("car", namespace=self.namespace)
         executor.add_node(node)
         self._starts = node.create_publisher(PoseStamped, "start_pose", 1)
@@ -147,11 +123,25 @@ class Car:
         self._route: list[np.ndarray] = []
         self.results: list[dict] = []  # of goals that ended
         self.result: dict = {}  # of the one that is driven to
+        self._seen = floor.grid  # the map as it was published last
+        self._believed = self._home  # the pose as it was published last
+        self.waits: list[Wait] = []
+        self._wait: Wait | None = None  # the present one
+        rules = [part for name, value in PARAMETERS.items() for part in ("-p", f"{name}:={json.dumps(value)}")]
+        # Last, so that no planner is left where the car cannot be placed.
+        with open(log / f"car{number}.log" if log else os.devnull, "w") as file:
+            self._planner = subprocess.Popen([*planner_command(), "--ros-args", "-r", f"__ns:={self.namespace}", *rules],
+                                             stdout=file, stderr=subprocess.STDOUT)
 
     @property
     def is_connected(self) -> bool:
         """True once the planner hears all."""
         return all(topic.get_subscription_count() for topic in (self._starts, self._routes, self._maps))
+
+    def stop(self) -> None:
+        """End the planner."""
+        self._planner.terminate()
+        self._planner.wait()
 
     def _on_plan(self, message: PathMessage) -> None:
         poses = [(p.pose.position.x, p.pose.position.y, 2 * math.atan2(p.pose.orientation.z, p.pose.orientation.w))
@@ -171,7 +161,7 @@ class Car:
             home, other = self._random_pose(0.6), self._random_pose(0.6)
             if self._is_solved(home, other) and self._is_solved(other, home):
                 return home
-        raise SystemExit("there is hardly room to drive on this map")
+        raise SystemExit(NO_ROOM)
 
     def _is_solved(self, start: tuple, goal: tuple) -> bool:
         problem = Problem(self._floor.grid, Vehicle(TURNING_RADIUS, BODY + MARGIN), start, goal)
@@ -193,32 +183,34 @@ class Car:
         self._last_place = places[-1]
         self._route = [np.array(place) for place in places]
         self.result = {"car": self.namespace, "goal": [round(a, 3) for a in places[-1]], "waypoints": len(places) - 1,
-                        "reached": False, "seconds": 0.0, "driven": 0.0, "plans": 0, "standstill": 0.0, "without_path": 0.0,
-                        "least_room": math.inf}
-        self._plan = np.empty((0, 3))
-        self._stood = self._without_path = 0.0
+                        "reached": False, "seconds": 0.0, "driven": 0.0, "plans": 0, "without_path": 0.0, "least_room": math.inf}
+        self._plan, self._wait = np.empty((0, 3)), None
         message = PoseArray(poses=[pose_message(place) for place in places])
         message.header.frame_id = "map"
         self._routes.publish(message)
 
     def publish_pose(self) -> None:
         """Publish where the car believes to be."""
-        x, y, yaw = self.pose + self._rng.normal(0.0, (NOISE_XY, NOISE_XY, NOISE_YAW))
-        message = PoseStamped(pose=pose_message((x, y, yaw)))
+        self._believed = tuple(self.pose + self._rng.normal(0.0, (NOISE_XY, NOISE_XY, NOISE_YAW)))
+        message = PoseStamped(pose=pose_message(self._believed))
         message.header.frame_id = "map"
         self._starts.publish(message)
 
     def publish_map(self, others: list[np.ndarray]) -> None:
         """Publish the map as the car has it."""
-        self._maps.publish(grid_message(self._floor.seen(self.pose, others), "map", Time()))
+        self._seen = self._floor.seen(self.pose, others)
+        self._maps.publish(grid_message(self._seen, "map", Time()))
+        if self._wait:
+            self._wait.views.append(self._view())
+
+    def _view(self) -> View:
+        assert self._wait
+        return View(self._wait.seconds, self._seen, self._believed, [tuple(place) for place in self._route])
 
     def step(self, seconds: float, others: list[np.ndarray]) -> None:
         """Drive on, be judged, and choose another goal where this one is reached."""
-        driven = 0.0 if self._is_braking(others) else seconds * SPEED
-        is_lost = len(self._plan) == 0
-        self._without_path = self._without_path + seconds if is_lost else 0.0
-        self._stood = self._stood + seconds if is_lost and not self._is_hemmed_in(others) else 0.0
-        driven *= not is_lost
+        self._wait_for_path(seconds)
+        driven = 0.0 if self._wait or self._is_braking(others) else seconds * SPEED
         if driven:
             self._curvature += (self._steered() - self._curvature) * min(1.0, seconds / STEERING_LAG)
             middle = self.pose[2] + driven * self._curvature / 2
@@ -226,14 +218,25 @@ class Car:
         result = self.result
         result["seconds"] += seconds
         result["driven"] += driven
-        result["standstill"] = max(result["standstill"], self._stood)
-        result["without_path"] = max(result["without_path"], self._without_path)
+        result["without_path"] = max(result["without_path"], self._wait.seconds if self._wait else 0.0)
         result["least_room"] = min(result["least_room"], self._floor.room(*self.pose[:2]) - BODY,
                                    *(math.dist(self.pose[:2], person[:2]) - BODY - PERSON for person in self._floor.people),
                                    *(math.dist(self.pose[:2], other[:2]) - 2 * BODY for other in others))
         self._judge_goal()
 
+    def _wait_for_path(self, seconds: float) -> None:
+        if len(self._plan):
+            self._wait = None
+            return
+        if not self._wait:
+            self._wait = Wait(self.result)
+            self._wait.views.append(self._view())
+            self.waits.append(self._wait)
+        self._wait.seconds += seconds
+
     def _judge_goal(self) -> None:
+        if len(self._route) > 1 and math.dist(self.pose[:2], self._route[0][:2]) < REACHED_XY:
+            del self._route[0]
         goal, result = self._route[-1], self.result
         off = abs(math.remainder(self.pose[2] - goal[2], 2 * math.pi))
         at_goal = math.dist(self.pose[:2], goal[:2]) <= REACHED_XY and off <= REACHED_YAW
@@ -258,11 +261,6 @@ class Car:
         across = -(tx - x) * math.sin(yaw) + (ty - y) * math.cos(yaw)
         curvature = 2 * across / max((tx - x) ** 2 + (ty - y) ** 2, 1e-6)
         return max(-MOST_CURVATURE, min(MOST_CURVATURE, curvature))
-
-    def _is_hemmed_in(self, others: list[np.ndarray]) -> bool:
-        """Return True if somebody is so near to the car, a waypoint or the goal that there may be no path."""
-        somebody = [*self._floor.people[:, :2], *(other[:2] for other in others)]
-        return any(math.dist(place[:2], body) < NEARBY for place in (self.pose, *self._route) for body in somebody)
 
     def _is_braking(self, others: list[np.ndarray]) -> bool:
         """Return True if the next metre of the path leads nearer to somebody who is near, as any driver sees.
@@ -313,6 +311,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--map", default="maze", help="map file, or the name of an installed map")
     parser.add_argument("--robots", type=int, default=1)
+    parser.add_argument("--log", type=Path, help="folder for the logs of the planners")
     arguments = parser.parse_args()
     grid = load_map(find_map(arguments.map))
     if not isinstance(grid, GridMap):
@@ -321,27 +320,38 @@ def main() -> int:
     floor = Floor(grid, rngs[0])
     rclpy.init()
     executor = SingleThreadedExecutor()
-    cars = [Car(number, floor, executor, rng) for number, rng in enumerate(rngs[1:], 1)]
+    cars: list[Car] = []
     try:
+        for number, rng in enumerate(rngs[1:], 1):
+            cars.append(Car(number, floor, executor, rng, arguments.log))
         drive(cars, floor, executor, arguments.minutes)
     finally:
         for car in cars:
-            car.planner.terminate()
-            car.planner.wait()
+            car.stop()
         executor.shutdown()
         rclpy.try_shutdown()
+    summary = summarise(cars)
+    print(json.dumps(summary), flush=True)
+    return 0 if summary["reached"] and not summary["touched"] and summary["longest_standstill"] <= MOST_STANDSTILL else 1
+
+
+def summarise(cars: list[Car]) -> dict:
+    """Judge the times without a path that were long, with a line for each, and return the figures of the whole drive."""
     results = [result for car in cars for result in car.results]
     reached = [result for result in results if result["reached"]]
     touched = [result for result in (*results, *(car.result for car in cars)) if result["least_room"] < 0]
-    summary = {"goals": len(results), "reached": len(reached), "touched": len(touched),
-               "longest_standstill": max((result["standstill"] for result in results), default=0.0),
-               "longest_without_path": max((result["without_path"] for result in results), default=0.0),
-               "plans_a_second": round(sum(result["plans"] for result in results)
-                                       / max(1.0, sum(result["seconds"] for result in results)), 2),
-               "driven_over_shortest": round(sum(result["driven"] for result in reached)
-                                             / max(1.0, sum(result.get("shortest", 0.0) for result in reached)), 3)}
-    print(json.dumps(summary), flush=True)
-    return 0 if reached and not summary["touched"] else 1
+    waits = [wait.seconds for car in cars for wait in car.waits]
+    judged = [wait.judged() for car in cars for wait in car.waits if wait.seconds > MOST_STANDSTILL]
+    for wait in judged:
+        print(json.dumps(wait), flush=True)
+    short = [seconds for seconds in waits if seconds <= MOST_STANDSTILL]
+    return {"goals": len(results), "reached": len(reached), "touched": len(touched),
+            "longest_standstill": round(max([*short, *(wait["standstill"] for wait in judged)], default=0.0), 3),
+            "longest_without_path": round(max(waits, default=0.0), 3),
+            "plans_a_second": round(sum(result["plans"] for result in results)
+                                    / max(1.0, sum(result["seconds"] for result in results)), 2),
+            "driven_over_shortest": round(sum(result["driven"] for result in reached)
+                                          / max(1.0, sum(result.get("shortest", 0.0) for result in reached)), 3)}
 
 
 if __name__ == "__main__":

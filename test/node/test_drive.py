@@ -1,15 +1,18 @@
 """Seconds and a minute of driving with the node, on a map that changes: examples/drive.py, as a user starts it."""
 
+import importlib
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from dubins_rrt_ros.planning import kernels_compiled
+from dubins_rrt_ros.planning import GridMap, kernels_compiled
 
 DRIVE = Path(__file__).resolve().parents[2] / "examples" / "drive.py"
 
@@ -26,3 +29,42 @@ def test_a_car_drives_reaches_goals_and_touches_nothing(record_property, minutes
     assert summary["touched"] == 0
     assert summary["reached"] >= (minutes >= 1)
     assert all(goal["least_room"] >= 0 for goal in goals)
+
+
+def test_a_car_that_cannot_be_placed_leaves_no_planner_behind(tmp_path):
+    (tmp_path / "narrow.pgm").write_bytes(b"P5 10 10 255\n" + bytes([254] * 100))
+    (tmp_path / "narrow.yaml").write_text("image: narrow.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
+                                          "occupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    command = [sys.executable, str(DRIVE), "--map", str(tmp_path / "narrow.yaml")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        _, errors = process.communicate(timeout=120)
+        assert process.returncode == 1
+        assert errors.endswith("there is hardly room to drive on this map\n")
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)
+
+
+@pytest.fixture
+def drive(monkeypatch):
+    """Return the example as a module."""
+    monkeypatch.syspath_prepend(str(DRIVE.parent))
+    return importlib.import_module("drive")
+
+
+def corridor(person: float | None = None) -> GridMap:
+    """Return a map of a corridor that is 20 m long and 1.5 m wide, with somebody in the middle of it at x [m]."""
+    cells = np.zeros((30, 400), np.int8)
+    if person is not None:
+        middle = int(person / 0.05)
+        cells[10:20, middle - 5:middle + 5] = 100
+    return GridMap(cells, 0.05, (0.0, 0.0, 0.0), percent=True)
+
+
+def test_a_planner_is_not_blamed_for_somebody_in_the_only_way_far_ahead(drive):
+    start, goal = (1.0, 0.75, 0.0), (19.0, 0.75, 0.0)
+    views = [(0.0, corridor()), (0.3, corridor(person=12.0)), (2.0, corridor()), (2.4, corridor()), (3.2, corridor(person=15.0))]
+    wait = drive.Wait({"car": "/car1"}, seconds=5.0, views=[drive.View(begin, grid, start, [goal]) for begin, grid in views])
+    judged = wait.judged()
+    assert judged["without_path"] == 5.0
+    assert judged["standstill"] == pytest.approx(1.2)
+    assert judged["pose"] == list(start) and judged["places"] == [list(goal)]
