@@ -18,7 +18,8 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,10 +35,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from dubins_rrt_ros.cli.demo.process import planner_command
 from dubins_rrt_ros.node.conversions import grid_message, pose_message
-from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan, plan_through
+from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, load_map, plan, prepare
 from dubins_rrt_ros.planning.maps.locate import find_map
 
 MARGIN, TURNING_RADIUS = 0.1, 1.0
+VEHICLE = Vehicle(TURNING_RADIUS, BODY + MARGIN)
 #: What the car can do: its speed [m/s], its curvature [1/m], and the time constant of its steering [s].
 SPEED, MOST_CURVATURE, STEERING_LAG = 0.7, 1.25, 0.1
 #: Distance along the path at which it is steered [m], and the standard deviations of its pose [m, rad].
@@ -50,12 +52,14 @@ LOOK, LOOK_FOR_CARS = 25, 60
 MOST_TRIES = 50
 #: Within this of the goal it is reached [m, rad]; a goal is given up after this time [s].
 REACHED_XY, REACHED_YAW, PATIENCE = 0.25, 0.5, 180.0
+#: Within this of the goal the path may end [m, rad]; a place is one only if ways lead on from it in directions off by SLANT, too.
+TOLERANCE_XY, TOLERANCE_YAW, SLANT = 0.15, 0.3, 0.4
 #: Time in which the judge looks for a path on a map without one, and the longest that a car may wait for its planner [s].
 JUDGING_TIME, MOST_STANDSTILL = 3.0, 1.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {"robot_radius": BODY + MARGIN, "turning_radius": TURNING_RADIUS, "replan_on_map_change": True, "replan_rate": 2.0,
-              "start_slack": MARGIN, "samples": 500, "planning_time": 1.0,
-              "goal_tolerance_xy": 0.6 * REACHED_XY, "goal_tolerance_yaw": 0.6 * REACHED_YAW}
+              "start_slack": MARGIN, "samples": 500, "planning_time": 0.5,
+              "goal_tolerance_xy": TOLERANCE_XY, "goal_tolerance_yaw": TOLERANCE_YAW}
 
 
 class View(NamedTuple):
@@ -95,11 +99,14 @@ class Wait:
 
 
 def shows_way(view: View) -> bool:
-    """Return True if a way leads over all places."""
-    *waypoints, goal = view.places
-    problem = Problem(view.grid, Vehicle(TURNING_RADIUS, BODY + MARGIN), view.pose, goal, start_slack=MARGIN,
-                      goal_tolerance_xy=PARAMETERS["goal_tolerance_xy"], goal_tolerance_yaw=PARAMETERS["goal_tolerance_yaw"])
-    return plan_through(problem, waypoints, Settings(planner="rrt", planning_time=JUDGING_TIME, seed=1)).solved
+    """Return True if a way leads from the pose to each place in turn."""
+    x, y, yaw = view.pose
+    poses = [(x, y, math.remainder(yaw, math.tau)), *view.places]
+    world = prepare(view.grid, VEHICLE)
+    legs = [Problem(world, start=here, goal=there) for here, there in pairwise(poses)]
+    legs[0] = replace(legs[0], start_slack=MARGIN)
+    legs[-1] = replace(legs[-1], goal_tolerance_xy=TOLERANCE_XY, goal_tolerance_yaw=TOLERANCE_YAW)
+    return all(plan(leg, Settings(planner="rrt", planning_time=JUDGING_TIME, seed=1)).solved for leg in legs)
 
 
 class Car:
@@ -107,6 +114,7 @@ class Car:
 
     def __init__(self, number: int, floor: Floor, executor: SingleThreadedExecutor, rng: np.random.Generator, log: Path | None):
         self._number, self._floor, self._rng = number, floor, rng
+        self._world = prepare(floor.grid, VEHICLE)  # without people
         self.namespace = f"/car{number}"
         node = rclpy.create_node("car", namespace=self.namespace)
         executor.add_node(node)
@@ -159,19 +167,21 @@ class Car:
         """Return a pose from which a way leads to others, and back again."""
         for _ in range(MOST_TRIES):
             home, other = self._random_pose(0.6), self._random_pose(0.6)
-            if self._is_solved(home, other) and self._is_solved(other, home):
+            if self._leads(home, other) and self._leads(other, home):
                 return home
         raise SystemExit(NO_ROOM)
 
-    def _is_solved(self, start: tuple, goal: tuple) -> bool:
-        problem = Problem(self._floor.grid, Vehicle(TURNING_RADIUS, BODY + MARGIN), start, goal)
-        return plan(problem, Settings(planner="rrt", planning_time=0.3, seed=1)).solved
+    def _leads(self, start: tuple, goal: tuple) -> bool:
+        """Return True if a way leads from a place, which the car may have reached in another direction, to another one."""
+        settings = Settings(planner="rrt", planning_time=0.3, seed=1)
+        starts = [(*start[:2], math.remainder(start[2] + turn, math.tau)) for turn in (0.0, -SLANT, SLANT)]
+        return all(plan(Problem(self._world, start=start, goal=goal), settings).solved for start in starts)
 
     def _next_place(self, here: tuple) -> tuple[float, float, float]:
         """Return a pose that a way leads to, and from which one leads home; home itself where none is found."""
         for _ in range(MOST_TRIES):
             place = self._random_pose(BODY + MARGIN + 0.15)
-            if math.dist(here[:2], place[:2]) > 2.0 and self._is_solved(here, place) and self._is_solved(place, self._home):
+            if math.dist(here[:2], place[:2]) > 2.0 and self._leads(here, place) and self._leads(place, self._home):
                 return place
         return self._home
 
@@ -244,6 +254,8 @@ class Car:
         if result["reached"] or result["seconds"] > PATIENCE:
             self.results.append({name: round(value, 3) if isinstance(value, float) else value for name, value in result.items()})
             print(json.dumps(self.results[-1]), flush=True)
+            if not result["reached"]:  # somebody carries it home
+                self.pose, self._last_place = np.array(self._home), self._home
             self.choose_goal()
 
     def _steered(self) -> float:
