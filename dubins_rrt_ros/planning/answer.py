@@ -27,7 +27,7 @@ class AuditedPath:
     Attributes:
         cost: the cost of the path [m].
         found: the best path of the search, of which this one is a simpler form, or the same.
-        is_simple: False where the path was not simplified, since the first one is not to wait for that.
+        is_simple: False where the path was not simplified, since the first one is not to wait for that, or not wholly.
         work: where the work that made it ended.
     """
 
@@ -46,6 +46,15 @@ class AuditedPath:
         if other is None or self.cost < other.cost - LEAST_IMPROVEMENT:
             return True
         return self.is_simple > other.is_simple and self.path != other.path
+
+    def outlasts(self, other: "AuditedPath", price: float) -> bool:
+        """Return True if this stays the answer after a cheaper path that there was no time to simplify.
+
+        Args:
+            price: of a curve [m].
+        """
+        more = len(other.path.curves) - len(self.path.curves)
+        return self.is_simple > other.is_simple and self.cost < other.cost + price * more
 
 
 def success_message(problem: Problem, settings: Settings, answer: AuditedPath, bounds: tuple[float, float], elapsed: float, *,

@@ -25,6 +25,7 @@ from .search.headings import FOLLOW_COST_TO_GO
 from .search.known_path import KnownPath
 from .search.lower_bound import lower_bound
 from .search.rrt import Search
+from .search.smoothing import price_of_curve
 from .search.tree import Tree
 from .settings import Settings, demand_settings
 from .work import Work, WorkDone
@@ -39,7 +40,7 @@ SAME = 1e-9
 AUDIT_INTERVAL, UNHEARD_AUDIT_INTERVAL = 5, 50
 #: Minimum improvement of a cost that is not the length that is simplified and audited before the end, relative to the cost.
 WORTH_SIMPLIFYING = 1e-3
-#: Time that is kept for the audit of the answer, in times that the last one took; before the first one, share of what is left.
+#: Time that is kept to simplify and audit the answer, in times that it took last; before the first one, share of what is left.
 AUDIT_RESERVE, FIRST_AUDIT_SHARE = 1.5, 0.5
 #: Share of the time, and maximum time [s], that is kept to tell why there is no path.
 REASONS_SHARE, MOST_FOR_REASONS = 0.1, 0.1
@@ -82,8 +83,7 @@ class _Call:
 
     def __init__(self, problem: Problem, settings: Settings, cancel: Callable[[], bool], on_progress: Callable[[Progress], None],
                  report_samples: int = 0, seed_path: Path | None = None):
-        self._report_samples = report_samples
-        self._samples_reported = 0
+        self._report_samples, self._samples_reported = report_samples, 0
         self._problem, self._settings, self._on_progress, self._seed_path = problem, settings, on_progress, seed_path
         self._deadline = Deadline(settings.planning_time, cancel)
         self._limit, self._before = settings.planning_time, 0.0  # of the request, and its time before this call [s]
@@ -213,8 +213,8 @@ class _Call:
             self._report_progress(search.samples, improved, lambda: self._snapshot(search), lambda: search.tree)
 
     def _is_report_due(self, samples: int) -> bool:
-        by_samples = 0 < self._report_samples <= samples - self._samples_reported
-        return by_samples or self._elapsed - self._last_report >= REPORT_INTERVAL
+        return (0 < self._report_samples <= samples - self._samples_reported
+                or self._elapsed - self._last_report >= REPORT_INTERVAL)
 
     def _report_progress(self, samples: int, improved: bool, snapshot: Callable[[], Plan], tree: Callable[[], Tree]) -> None:
         self._last_report = self._elapsed
@@ -240,32 +240,31 @@ class _Call:
             audited = self._audited(path, search, simplify=self._best is not None)
         except OutOfTime:
             return False
-        if audited.audit.ok and audited.improves(self._best):
+        if is_better := audited.audit.ok and audited.improves(self._best):
             self._keep(audited)
-            return True
-        return False
+        return is_better
 
     def _audited(self, path: Path, search: Search, simplify: bool = True, is_last: bool = False) -> AuditedPath:
         """Simplify and audit a path once: an improvement that was reported is often the answer too."""
-        simple, simplified, merging = path, 0, Work(self._deadline.poll, self._settings.work_limits.merging)
-        if simplify and not search.objective.is_length:
-            known = self._best if self._best and self._best.is_simple and self._best.found == path else None
-            simple, simplified = (known.path, known.work.simplification) if known else self._simplified(path, search)
+        is_length, merging = search.objective.is_length, Work(self._deadline.poll, self._settings.work_limits.merging)
+        simple, simplified, is_simple = self._simplified(path, search) if simplify and not is_length else (path, 0, is_length)
         if is_last:
             simple = search.without_short_arcs(simple, merging)
         self._found_cost = search.cost
         return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
-                        search.objective.path_cost(simple), path, simplify or search.objective.is_length,
+                           search.objective.path_cost(simple), path, is_simple,
                            WorkDone(search.work.done, simplified, merging.done))
 
-    def _simplified(self, path: Path, search: Search) -> tuple[Path, int]:
-        """Return a simpler form of a path, and the work of it; time is kept for that once it is known how long it takes."""
+    def _simplified(self, path: Path, search: Search) -> tuple[Path, int, bool]:
+        """Return a simpler form of a path, the work of it, and whether there was the time for all of that."""
+        if (best := self._best) and best.is_simple and best.found == path:
+            return best.path, best.work.simplification, True
         work = Work(self._deadline.poll, self._settings.work_limits.simplification)
         self._deadline.reserve = AUDIT_RESERVE * self._audit_took
         began = self._elapsed
         simple = search.simplified(path, work)
         self._simplifying_took = self._elapsed - began
-        return simple, work.done
+        return simple, work.done, not work.is_interrupted
 
     def _audit(self, path: Path) -> Audit:
         """Audit a path, unless that was done last."""
@@ -273,9 +272,10 @@ class _Call:
             return self._best.audit
         began = self._elapsed
         audit = audit_path(path, self._problem, self._obstacles, self._deadline.check)
-        self._last_audit = self._elapsed
-        self._audit_took = self._last_audit - began
-        self._deadline.reserve = AUDIT_RESERVE * self._audit_took + self._simplifying_took
+        self._last_audit, self._audit_took = self._elapsed, self._elapsed - began
+        if self._objective and not self._objective.is_length and self._simplifying_took == 0:
+            self._simplifying_took = self._audit_took  # an estimate: it takes about as long
+        self._deadline.reserve = AUDIT_RESERVE * (self._audit_took + self._simplifying_took)
         return audit
 
     def _keep(self, audited: AuditedPath) -> None:
@@ -321,7 +321,8 @@ class _Call:
             return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples)
         if not audited.audit.ok:
             return self._plan(Status.UNKNOWN, defect_message(audited.audit), tree, samples=samples, audit=audited.audit)
-        self._keep(audited)
+        if not (self._best and self._best.outlasts(audited, price_of_curve(self._problem.vehicle))):
+            self._keep(audited)
         if search and (bound := search.make_bound(self._time_for_bound())):
             self._cost_bound = lower_bound(self._problem, bound)
             self._bound = lower_bound(self._problem, search.make_length_bound())
@@ -336,9 +337,8 @@ class _Call:
 
     def _not_audited(self, path: Path, tree: Tree, samples: int) -> Plan:
         """Return the plan without a path where one was found, but too late for its audit."""
-        cancelled = self._deadline.cancelled
-        return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, not_audited_message(path), tree, samples=samples,
-                          cancelled=cancelled)
+        status, cancelled = Status.CANCELLED if self._deadline.cancelled else Status.TIMEOUT, self._deadline.cancelled
+        return self._plan(status, not_audited_message(path), tree, samples=samples, cancelled=cancelled)
 
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
         message = f"Cancelled before a first path: {self._drawn(samples, len(tree))}."

@@ -51,6 +51,11 @@ class Work:
         self._is_over = self._is_over or self.done >= self._limit or self._interrupted()
         return self._is_over
 
+    @property
+    def is_interrupted(self) -> bool:
+        """True if it was ended early, and not by its limit."""
+        return self._is_over and self.done < self._limit
+
     def interrupting(self, interrupted: Callable[[], bool]) -> Callable[[], bool]:
         """Return what interrupts work in the background; once it did, this work is over too, and takes nothing of that."""
         def is_interrupted() -> bool:

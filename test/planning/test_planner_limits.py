@@ -2,14 +2,16 @@
 
 import itertools
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.cases import SCALE, empty_map, needs_compiled
 from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_reach, settings, walled
 
-from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, plan, prepare
+from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, load_map, plan, prepare
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.search.rrt import Search
 from dubins_rrt_ros.planning.search.smoothing import smooth
 from dubins_rrt_ros.planning.work import Work
 
@@ -241,3 +243,30 @@ def test_smoothing_looks_at_the_time_before_the_first_change():
     smoothed = smooth(path, VEHICLE, field, np.random.default_rng(1), True, Work(look))
     assert 1000 < len(smoothed.words) < len(path.words)
     assert smoothed.length == pytest.approx(16.0)
+
+
+def test_a_simple_path_stays_the_answer_where_there_is_no_time_to_simplify_a_cheaper_one(monkeypatch):
+    simplified, simpler = Search.simplified, []
+
+    def hurried(search, path, work):
+        if simpler:
+            work.interrupting(lambda: True)()  # as the time does
+            return path
+        simpler.append(simplified(search, path, work))
+        return simpler[0]
+
+    monkeypatch.setattr(Search, "simplified", hurried)
+    problem = Problem(load_map("forest"), VEHICLE, (1.2, 1.2, 0.79), (18.8, 16.8, 0.79))
+    result = plan(problem, settings("rrt_star", seed=3), on_progress=lambda _: None)
+    assert len(simpler) == 1 and result.path == simpler[0]
+    assert result.samples < result.settings.samples
+    monkeypatch.undo()
+    again = plan(problem, replace(result.settings, work_limits=result.work))
+    assert again.path == result.path
+
+
+def test_work_is_interrupted_by_its_time_and_not_by_its_limit():
+    ended, limited = Work(lambda: True), Work(limit=1)
+    limited.done += 1
+    assert (ended.is_over, limited.is_over) == (True, True)
+    assert (ended.is_interrupted, limited.is_interrupted) == (True, False)

@@ -27,6 +27,11 @@ PRICE, SIMPLIFYING_TRIES, SIMPLIFICATIONS = 0.01, 128, 12
 WORTHWHILE_GAIN = 1e-4
 
 
+def price_of_curve(vehicle: Vehicle) -> float:
+    """Return the price of a curve of a path that is published [m]."""
+    return PRICE * vehicle.maneuver_scale
+
+
 def smooth(path: Path, vehicle: Vehicle, field: ClearanceField, rng: np.random.Generator, first_round: bool,
            work: Work | None = None, objective: Objective | None = None, price: float = 0.0) -> Path:
     """Return a path with the same ends that never costs more, but for what the price of curves saves.
@@ -88,7 +93,7 @@ class Smoother:
         if self._objective.is_length:
             return path
         rng = np.random.default_rng((self._seed, 4))
-        price = PRICE * self._objective.vehicle.maneuver_scale
+        price = price_of_curve(self._objective.vehicle)
         cost, before = self._objective.path_cost(path) + price * len(path.words), math.inf
         for _ in range(SIMPLIFICATIONS):
             if before - cost < price or work.is_over:
