@@ -62,14 +62,19 @@ def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray
 def _halves(a: np.ndarray, b: np.ndarray, radius: float) -> list[np.ndarray]:
     """Return both halves of pairs of boxes: of each pair the interval that matters most is halved."""
     widest = np.column_stack([box[:, SIZES] * (1, 1, radius) for box in (a, b)]).argmax(axis=1)
-    halves = [np.tile(box, (2, 1)) for box in (a, b)]
-    for number, box in enumerate(halves):
-        box[:, SIZES] /= 1 + (np.tile(widest, 2)[:, None] == 3 * number + np.arange(3))
-        along, across, turn = (np.repeat((-1, 1), len(a))[:, None] * (np.tile((a, b)[number], (2, 1)) - box)[:, SIZES]).T
-        box[:, 0] += along * box[:, 2] - across * box[:, 3]
-        box[:, 1] += along * box[:, 3] + across * box[:, 2]
-        box[:, 6] += turn
-    return halves
+    ends = np.split(np.arange(6) != widest[:, None], 2, axis=1)  # from -1 to 1, or to and from the middle
+    return [np.concatenate([part(box, -1, end), part(box, -1 * end, 1)]) for box, end in zip((a, b), ends, strict=True)]
+
+
+def part(boxes: np.ndarray, low: np.ndarray | int, high: np.ndarray | int) -> np.ndarray:
+    """Return parts of boxes, by (n, 3) ends of their ranges along and across a box and of the headings, from -1 to 1."""
+    boxes = boxes.copy()
+    along, across, turn = (boxes[:, SIZES] * (low + high) / 2).T
+    boxes[:, 0] += along * boxes[:, 2] - across * boxes[:, 3]
+    boxes[:, 1] += along * boxes[:, 3] + across * boxes[:, 2]
+    boxes[:, 6] += turn
+    boxes[:, SIZES] *= (high - low) / 2
+    return boxes
 
 
 def _least_of_whole(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .bounds import too_high
-from .levels import Corridor, gradients
+from .bounds import part, too_high
+from .levels import FROM_START, TO_GOAL, Squares, gradients
 from .maps import UnreadableMap, World, read_map
 
 #: Greatest error of the path's end [m, rad], and distance of a curve from the polygon that stands for it [m].
@@ -110,29 +110,28 @@ class _Bound:
 
     def __init__(self, document: dict[str, Any], world: World):
         self._document, self._world, request = document, world, document["request"]
-        self._radius, self._bound, self._limit = (float(number) for number in (
-            request["turning_radius"], document["bound"], document["limit"]))
+        self._radius, self._bound, self._tolerance = request["turning_radius"], document["bound"], request["goal_tolerance_xy"]
         self._start, self._goal = world.own(request["start"]), world.own(request["goal"])
-        self._tolerance = float(request["goal_tolerance_xy"])
-        self._start_box = pose_box(*self._start)
+        self._start_box = goal_boxes(self._start, 0, 0, 0)
         self._goal_boxes = goal_boxes(self._goal, self._tolerance, request["goal_tolerance_yaw"], self._bound)
         self._inner = inner_radius(request)
-        self._margin = MARGIN * (self._limit + world.size)
+        self._margin = MARGIN * (document["limit"] + world.size)
 
     def check(self) -> None:
         """Raise Refused where something of the proof does not hold."""
         if not self._document["levels"]:
             return self._check_edges({}, 0, {0}, math.inf)
-        corridor = self._corridor = Corridor(self._document)
-        _demand(corridor.to_goal.side > 0, "the squares have no size")
-        _demand(np.all(np.diff(corridor.levels) > 0) and not np.isin(corridor.from_start.costs, corridor.levels).any(),
+        squares = self._squares = Squares(self._document)
+        _demand(squares.side > 0, "the squares have no size")
+        _demand(np.all(np.diff(squares.levels) > 0) and not np.isin(squares.costs[FROM_START], squares.levels).any(),
                 "the levels do not ascend, or one is a node's")
         self._check_squares()
         # What a path of at least the limit is longer than the bound at least, as costs at its ends may be above 0.
-        near = corridor.domain & corridor.to_goal.near(*self._goal[:2], self._tolerance + self._margin)
-        highest = corridor.to_goal.corners()[near].max() if self._tolerance else corridor.to_goal.at(*self._goal[:2])[1]
+        near = squares.domain & squares.near(*self._goal[:2], self._tolerance + self._margin)
+        highest = squares.corners[TO_GOAL][near].max() if self._tolerance else squares.at(TO_GOAL, *self._goal[:2])[1]
         enough = self._bound + max(0.0, float(highest)) + self._margin
-        _demand(self._limit >= enough + max(0.0, corridor.from_start.at(*self._start[:2])[1]), "the corridor is too narrow")
+        lowest = squares.at(FROM_START, *self._start[:2])[1]
+        _demand(self._document["limit"] >= enough + max(0.0, lowest), "the corridor is too narrow")
         self._find_cells()
         (start,), self._start_box[:, 9] = self._cells_at(self._start, 0.0)
         goals, self._goal_boxes[:, 9] = self._cells_at(self._goal, self._tolerance)
@@ -140,13 +139,13 @@ class _Bound:
 
     def _check_squares(self) -> None:
         """Show that no cost rises by more than a metre a metre, and that nothing free touches the squares that have costs."""
-        domain, (corner, side, _) = self._corridor.domain, self._corridor.to_goal
-        for squares in (self._corridor.from_start, self._corridor.to_goal):
-            slopes = np.hypot(*np.moveaxis(gradients(squares.triangles(*np.nonzero(domain))), -1, 0))
-            _demand(np.all(slopes <= side * (1 - 5e-11)), "a potential is steeper than 1")
-        around = np.pad(domain, 2)
+        squares, half = self._squares, self._squares.side / 2
+        for which in (FROM_START, TO_GOAL):
+            slopes = np.linalg.norm(gradients(squares.triangles(which, *np.nonzero(squares.domain))), axis=-1)
+            _demand(np.all(slopes <= squares.side * (1 - 5e-11)), "a potential is steeper than 1")
+        around = np.pad(squares.domain, 2)
         near = np.lib.stride_tricks.sliding_window_view(around, (3, 3)).any(axis=(2, 3)) & ~around[1:-1, 1:-1]
-        points, half = corner + side * (np.argwhere(near)[:, ::-1] - 0.5), side / 2
+        points = squares.corner + squares.side * (np.argwhere(near)[:, ::-1] - 0.5)
         for _ in range(SQUARE_HALVINGS):
             room = self._room(points)
             _demand(np.all(room < self._inner), "the vehicle may be outside of all squares")
@@ -159,7 +158,7 @@ class _Bound:
 
     def _find_cells(self) -> None:
         """Take the cell of each part of a square from the certificate, and show that parts that meet have the same."""
-        parts, named = self._corridor.parts, np.array(self._document["cells"], dtype=int)
+        parts, named = self._squares.parts, np.array(self._document["cells"], dtype=int)
         _demand(named.shape == (parts.sum(),) and named.min(initial=0) >= 0, "the cells do not fit the corridor")
         cells = self._cells = np.full(parts.shape, -1)  # where there is none
         cells[parts] = named
@@ -170,34 +169,31 @@ class _Bound:
     def _cells_at(self, pose: tuple[float, float, float], tolerance: float) -> tuple[set[int], float]:
         """Return the cells that may hold a place that is as near to a pose [m], and the cost there if it is the only one."""
         if tolerance:
-            found = self._cells[:, self._corridor.to_goal.near(*pose[:2], tolerance + self._margin)]
+            found = self._cells[:, self._squares.near(*pose[:2], tolerance + self._margin)]
             return set(found[found >= 0].tolist()), math.nan
-        square, cost = self._corridor.from_start.at(*pose[:2])
-        is_inside = self._corridor.mask[square] and np.abs(self._corridor.levels - cost).min() > END
+        square, cost = self._squares.at(FROM_START, *pose[:2])
+        is_inside = self._squares.corridor[square] and np.abs(self._squares.levels - cost).min() > END
         _demand(is_inside, "an end is not inside a slab")
-        return {int(self._cells[int(self._corridor.slabs(cost)), *square])}, cost
+        return {int(self._cells[int(self._squares.slabs(cost)), *square])}, cost
 
     def _portals(self, start: int, goals: set[int]) -> dict[Portal, np.ndarray]:
         """Return the boxes of all portals that a path may come through, those that may be free, after showing that they cover."""
-        gates, rows = self._corridor.gates(), self._document["boxes"]
-        _demand(len(rows) == len(gates.cost), "the boxes do not fit the gates")
-        before, after = (self._cells[slab, gates.row, gates.column].tolist() for slab in (gates.before, gates.after))
-        keys = list(zip(before, after, strict=True))
-        used = used_portals(set(keys), start, goals)
-        found: dict[Portal, list[tuple[float, ...]]] = {key: [] for key in used}
-        for gate, (key, boxes) in enumerate(zip(keys, rows, strict=True)):
-            if key in used:
-                _demand(_covers(boxes), f"boxes do not cover a level at {gates.ends[gate].round(3).tolist()}")
-                found[key] += [(gate, *row) for row in boxes]
-        portals = {}
-        for key, some in found.items():
-            table = np.array(some, dtype=float)
-            boxes = gates.boxes(table[:, 0].astype(int), table[:, 1:], self._margin)
-            closed = np.isnan(boxes[:, 8])
-            room = self._room(boxes[closed, :2]) + boxes[closed, 4]
-            _demand(np.all(room < self._inner), "a box that may be free has no potential")
-            portals[key] = boxes[~closed]
-        return portals
+        gates, *parts = self._squares.gates()
+        rows, keys = self._document["boxes"], list(zip(*(self._cells[*some.T].tolist() for some in parts), strict=True))
+        gate = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
+        table = np.array([row for some in rows for row in some], dtype=float).reshape(-1, 5)
+        _demand(len(rows) == len(keys) and np.all(np.abs(table[:, :4]) <= 1), "the boxes do not fit the gates")
+        boxes = boxes_on(gates[gate], table, self._margin)
+        closed = np.isnan(boxes[:, 8])
+        room = self._room(boxes[closed, :2]) + boxes[closed, 4]
+        _demand(np.all(room < self._inner), "a box that may be free has no potential")
+        found: dict[Portal, list[np.ndarray]] = {key: [] for key in used_portals(set(keys), start, goals)}
+        for number, key in enumerate(keys):
+            if key in found:
+                mine = np.flatnonzero(gate == number)
+                _demand(_covers(table[mine]), f"boxes do not cover a level at {gates[number, :2].round(3).tolist()}")
+                found[key].append(boxes[mine[~closed[mine]]])
+        return {key: np.concatenate(some) for key, some in found.items()}
 
     def _check_edges(self, portals: dict[Portal, np.ndarray], start: int, goals: set[int], enough: float) -> None:
         """Show that no potential is higher than the curves from the start allow, or those before it and the curves from there."""
@@ -212,24 +208,27 @@ class _Bound:
                 boxes = boxes[excess > 0]
                 excess = np.max([too_high(some, boxes, self._radius, self._margin) for some in ahead], axis=0, initial=0)
             if excess.max(initial=0) > 0:
-                place = boxes[excess.argmax(), (0, 1, 6)].round(3).tolist()
+                place = boxes[np.argmax(excess)][[0, 1, 6]].round(3).tolist()
                 raise Refused(f"the potential at {place} is {excess.max():.3g} m higher than those before it allow")
 
 
 def goal_boxes(goal: tuple[float, float, float], tolerance: float, turn: float, bound: float) -> np.ndarray:
-    """Return boxes that cover where the goal is reached, with the bound as their potential."""
+    """Return boxes that cover the poses within tolerances of one, with a potential, whose costs are not known."""
     parts, turn = GOAL_PARTS if tolerance else 1, min(turn, math.pi)
-    turns = max(1, math.ceil(2 * turn / GOAL_TURN))
-    half, turn = tolerance / parts, turn / turns
-    middles = [(2 * i + 1 - parts) * half for i in range(parts)]
-    return np.concatenate([pose_box(goal[0] + x, goal[1] + y, goal[2] + (2 * i + 1 - turns) * turn, half, turn, bound)
-                           for x in middles for y in middles for i in range(turns)
-                           if math.hypot(max(0.0, abs(x) - half), max(0.0, abs(y) - half)) <= tolerance])
+    counts = parts, parts, max(1, math.ceil(2 * turn / GOAL_TURN))
+    index = np.indices(counts).reshape(3, -1).T
+    whole = [*goal[:2], 1.0, 0.0, tolerance, tolerance, goal[2], turn, bound, math.nan, 0.0]
+    boxes = part(np.tile(whole, (len(index), 1)), 2 * index / counts - 1, 2 * (index + 1) / counts - 1)
+    off = np.maximum(np.abs(boxes[:, :2] - goal[:2]) - boxes[:, 4:6], 0)
+    return boxes[np.hypot(*off.T) <= tolerance]
 
 
-def pose_box(x: float, y: float, heading: float, half: float = 0.0, turn: float = 0.0, potential: float = 0.0) -> np.ndarray:
-    """Return the box of the poses near one, whose cost is not known."""
-    return np.array([[x, y, 1.0, 0.0, half, half, heading, turn, potential, math.nan, 0.0]])
+def boxes_on(gates: np.ndarray, rows: np.ndarray, margin: float) -> np.ndarray:
+    """Return (n, 11) boxes on gates by (n, 5) rows of a certificate, larger by a margin for rounding [m]."""
+    boxes = part(gates, rows[:, (0, 0, 2)], rows[:, (1, 1, 3)])  # a gate has no width
+    boxes[:, 4:6] += margin
+    boxes[:, 8] = rows[:, 4]
+    return boxes
 
 
 def inner_radius(request: dict[str, Any]) -> float:
@@ -244,24 +243,22 @@ def used_portals(portals: set[Portal], start: int, goals: set[int]) -> set[Porta
     """Return the portals on ways from the start to the goal that never go straight back, nor into the start's cell."""
     last = next(iter(goals)) if len(goals) == 1 else None  # a path ends with its last visit there
     portals = {(before, after) for before, after in portals if before != after and after != start and before != last}
-    onward = {one: {other for other in portals if other[0] == one[1] and other[1] != one[0]} for one in portals}
-    back = {one: {other for other in portals if one in onward[other]} for one in portals}
-    return (_reached(onward, {portal for portal in portals if portal[0] == start})
-            & _reached(back, {portal for portal in portals if portal[1] in goals}))
+    backwards = _reached({(after, before) for before, after in portals}, goals)
+    return _reached(portals, {start}) & {(before, after) for after, before in backwards}
 
 
-def _reached(links: dict[Portal, set[Portal]], found: set[Portal]) -> set[Portal]:
-    """Return what can be reached by links, from what is found already on."""
-    due = found
+def _reached(portals: set[Portal], cells: set[int]) -> set[Portal]:
+    """Return the portals on ways from some cells on that never go straight back."""
+    found: set[Portal] = set()
+    due = {portal for portal in portals if portal[0] in cells}
     while due:
-        due = set().union(*(links[portal] for portal in due)) - found
-        found = found | due
+        found |= due
+        due = {(cell, after) for cell, after in portals - found if any(cell == to and after != of for of, to in due)}
     return found
 
 
-def _covers(rows: list[list[float]]) -> bool:
-    """Return whether rectangles (s0, s1, h0, h1, ...) cover the one from (0, -1) to (1, 1) and nothing else."""
-    rectangles = np.array(rows, dtype=float).reshape(-1, 5)[:, :4]
-    s, h = np.unique(rectangles[:, :2]), np.unique(rectangles[:, 2:])
-    held = [(s0 <= s[:-1, None]) & (s[1:, None] <= s1) & (h0 <= h[:-1]) & (h[1:] <= h1) for s0, s1, h0, h1 in rectangles]
-    return bool(held) and (s[0], s[-1], h[0], h[-1]) == (0, 1, -1, 1) and bool(np.any(held, axis=0).all())
+def _covers(rectangles: np.ndarray) -> bool:
+    """Return whether rectangles (s0, s1, h0, h1, ...) cover the one from (-1, -1) to (1, 1)."""
+    s, h = (np.unique([-1, 1, *rectangles[:, axis:axis + 2].flat]) for axis in (0, 2))
+    held = [(s0 <= s[:-1, None]) & (s[1:, None] <= s1) & (h0 <= h[:-1]) & (h[1:] <= h1) for s0, s1, h0, h1, _ in rectangles]
+    return bool(np.any(held, axis=0).all())

@@ -10,8 +10,8 @@ from support.cases import needs_compiled
 from support.certificates import Certified, certified, hall, pose_in, recorded, refusal, saved
 from support.spoils import SPOILS, Drive
 
-from dubins_rrt_ros.checker.check import Refused, check, goal_boxes
-from dubins_rrt_ros.checker.levels import Corridor
+from dubins_rrt_ros.checker.check import Refused, boxes_on, check, goal_boxes
+from dubins_rrt_ros.checker.levels import FROM_START, Squares
 from dubins_rrt_ros.checker.maps import UnreadableMap
 from dubins_rrt_ros.planning import Problem, Vehicle
 from dubins_rrt_ros.planning.certificate.certificate import CertificateError, write_certificate
@@ -91,15 +91,25 @@ def test_boxes_of_the_goal_cover_where_it_is_reached_and_little_more(tolerance, 
     off = np.abs(poses[:, None] - boxes[:, (0, 1, 6)])
     assert (off <= boxes[:, (4, 5, 7)] + 1e-12).all(axis=2).any(axis=1).all()
     assert (np.hypot(*np.maximum(0, np.abs(boxes[:, :2] - (1, 2)) - boxes[:, 4:6]).T) <= tolerance).all()
-    assert (boxes[:, 8] == 7).all() and boxes[:, 7].max() <= 0.05 and boxes[:, 4].max() <= tolerance / 8
+    assert (boxes[:, 8] == 7).all() and boxes[:, 7].max() < 0.0501 and boxes[:, 4].max() <= tolerance / 8
     assert sum(boxes[:, 4] * boxes[:, 5] * boxes[:, 7]) <= 1.5 * tolerance**2 * turn
+
+
+def test_boxes_on_gates_are_shares_of_them_and_of_the_headings():
+    gates = np.array([[3.0, 2.0, 0.6, 0.8, 0.5, 0.0, 1.2, 1.6, 0.0, 7.0, 5.0]] * 3)
+    rows = np.array([(-1, 1, -1, 1, 3.0), (-0.5, 0, -1, 0, np.nan), (0, 1, 0.5, 1, 2.0)])
+    for box, (s0, s1, h0, h1, u) in zip(boxes_on(gates, rows, 1e-3), rows, strict=True):
+        place, heading = (s0 + s1) / 2 * 0.5, 1.2 + (h0 + h1) / 2 * 1.6
+        assert box[:4] == pytest.approx((3 + 0.6 * place, 2 + 0.8 * place, 0.6, 0.8))
+        assert box[4:8] == pytest.approx(((s1 - s0) / 2 * 0.5 + 1e-3, 1e-3, heading, (h1 - h0) / 2 * 1.6))
+        assert box[8:] == pytest.approx((u, 7, 5), nan_ok=True)
 
 
 def test_a_start_on_a_level_is_refused(tmp_path):
     """It would be in two cells."""
     drive = Drive.of(TURNED)
-    levels = [drive.corridor.from_start.at(*drive.poses[0, :2])[1] + 1e-9, *TURNED.document["levels"]]
-    parts = Corridor(TURNED.document | {"levels": levels}).parts
+    levels = [drive.squares.at(FROM_START, *drive.poses[0, :2])[1] + 1e-9, *TURNED.document["levels"]]
+    parts = Squares(TURNED.document | {"levels": levels}).parts
     cells = np.nonzero(parts)[0].tolist()  # one for each slab
     assert verdict(tmp_path, levels=levels, cells=cells) == "an end is not inside a slab"
 
@@ -116,7 +126,7 @@ def test_a_start_outside_of_all_squares_is_refused(tmp_path):
 def test_boxes_that_reach_beyond_their_gates_are_refused(tmp_path):
     """The middle of one that reaches too far is no number, of which nothing would be shown."""
     boxes = [[[-1e308, 1e308, -1, 1, 9.0]] if some else [] for some in TURNED.document["boxes"]]
-    assert "do not cover" in verdict(tmp_path, boxes=boxes)
+    assert "do not fit the gates" in verdict(tmp_path, boxes=boxes)
 
 
 @pytest.mark.parametrize("number", ["1e999", "-Infinity", "NaN"])

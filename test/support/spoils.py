@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dubins_rrt_ros.checker.levels import HALF_CIRCLE, Corridor
+from dubins_rrt_ros.checker.levels import FROM_START, HALF_CIRCLE, Squares
 from dubins_rrt_ros.checker.maps import read_map
 from dubins_rrt_ros.planning import GridMap, Problem, Vehicle, load_map, plan
 from dubins_rrt_ros.planning.audit import audit_path
@@ -52,14 +52,19 @@ class Drive:
         self.poses, self.along = _driven(self.document, self.world)
 
     @cached_property
-    def corridor(self):
-        """The corridor, where there are levels."""
-        return Corridor(self.document)
-
     def squares(self):
+        """The squares, where there are levels."""
+        return Squares(self.document)
+
+    @cached_property
+    def gates(self):
+        """The boxes of all poses in which gates are crossed."""
+        return self.squares.gates()[0]
+
+    def parts(self):
         """The rows, columns and slabs of the poses."""
-        found = [self.corridor.from_start.at(x, y) for x, y, _ in self.poses.tolist()]
-        return np.column_stack([[square for square, _ in found], self.corridor.slabs(np.array([cost for _, cost in found]))])
+        found = [self.squares.at(FROM_START, x, y) for x, y, _ in self.poses.tolist()]
+        return np.column_stack([[square for square, _ in found], self.squares.slabs(np.array([cost for _, cost in found]))])
 
     def crossings(self):
         """The crossings of the boxes, in their order; none where a level is crossed more than once."""
@@ -69,18 +74,17 @@ class Drive:
     def _crossings(self):
         if not self.document["levels"]:
             return []
-        gates, found = self.corridor.gates(), []
+        gates, found = self.gates, []
         before, after = self.poses[:-1, None, :2], self.poses[1:, None, :2]
-        first, along = gates.ends[:, 0], gates.ends[:, 1] - gates.ends[:, 0]
-        onward = np.stack([np.cos(gates.heading), np.sin(gates.heading)], axis=1)
-        height = [((points - first) * onward).sum(axis=2) for points in (before, after)]
-        share = ((before - first) * along).sum(axis=2) / (along**2).sum(axis=1)
-        crossed = (height[0] < 0) & (height[1] >= 0) & (share >= 0) & (share <= 1)
+        onward = np.stack([np.cos(gates[:, 6]), np.sin(gates[:, 6])], axis=1)
+        height = [((points - gates[:, :2]) * onward).sum(axis=2) for points in (before, after)]
+        share = ((before - gates[:, :2]) * gates[:, 2:4]).sum(axis=2) / gates[:, 4]
+        crossed = (height[0] < 0) & (height[1] >= 0) & (np.abs(share) <= 1)
         for pose, gate in zip(*(index.tolist() for index in np.nonzero(crossed)), strict=True):
-            off = math.remainder(self.poses[pose, 2] - gates.heading[gate], math.tau) / HALF_CIRCLE
+            off = math.remainder(self.poses[pose, 2] - gates[gate, 6], math.tau) / HALF_CIRCLE
             found += [Crossing(gate, row, float(self.along[pose + 1])) for row, box in enumerate(self.document["boxes"][gate])
-                      if box[0] + 0.01 < share[pose, gate] < box[1] - 0.01 and box[2] <= off <= box[3]]
-        levels = [gates.cost[crossing.gate] for crossing in found]
+                      if box[0] + 0.02 < share[pose, gate] < box[1] - 0.02 and box[2] <= off <= box[3]]
+        levels = [gates[crossing.gate, 9] for crossing in found]
         return found if levels == sorted(set(levels)) else []
 
     def open_crossings(self):
@@ -88,7 +92,7 @@ class Drive:
         for crossing in self.crossings():
             yield crossing
             potential = crossing.box(self.document)[4]
-            if potential is None or potential + self.corridor.gates().left[crossing.gate] >= self.document["bound"]:
+            if potential is None or potential + self.gates[crossing.gate, 10] >= self.document["bound"]:
                 return
 
 
@@ -138,7 +142,7 @@ def _raised_potentials(certified, rng, folder):
     """All potentials on a level, raised by a thousandth of the bound."""
     if not any(certified.document["boxes"]):
         return None
-    costs = Drive.of(certified).corridor.gates().cost
+    costs = Drive.of(certified).gates[:, 9]
     level = rng.choice([cost for cost, boxes in zip(costs, certified.document["boxes"], strict=True) if boxes])
 
     def change(document):
@@ -180,7 +184,7 @@ def _left_out_square(certified, rng, folder):
     """The corridor leaks: a square that the path leads through is left out."""
     if not certified.document["levels"]:
         return None
-    up, across, _ = rng.choice(Drive.of(certified).squares())
+    up, across, _ = rng.choice(Drive.of(certified).parts())
 
     def change(document):
         free = document["squares"]["free"]
@@ -193,12 +197,12 @@ def _parted_cell(certified, rng, folder):
     if not certified.document["levels"]:
         return None
     drive = Drive.of(certified)
-    parts = drive.squares()
+    parts = drive.parts()
     steps = np.flatnonzero((parts[1:, :2] != parts[:-1, :2]).any(axis=1) & (parts[1:, 2] == parts[:-1, 2]))
     if not len(steps):
         return None
     row, column, slab = parts[rng.choice(steps)]
-    numbers = np.cumsum(drive.corridor.parts).reshape(drive.corridor.parts.shape) - 1
+    numbers = np.cumsum(drive.squares.parts).reshape(drive.squares.parts.shape) - 1
 
     def change(document):
         document["cells"][numbers[slab, row, column]] = 1_000_000
@@ -264,7 +268,7 @@ def _raised_node(certified, rng, folder):
     """A cost to the goal beside the path, raised by more than that of two places across a square can differ."""
     if not certified.document["levels"]:
         return None
-    row, column, _ = rng.choice(Drive.of(certified).squares())
+    row, column, _ = rng.choice(Drive.of(certified).parts())
 
     def change(document):
         document["to_goal"][row][column] += 2.5 * document["squares"]["side"]

@@ -12,8 +12,8 @@ import shapely
 from scipy import ndimage
 
 from ...checker.bounds import too_high
-from ...checker.check import MARGIN, goal_boxes, inner_radius, pose_box, used_portals
-from ...checker.levels import Corridor
+from ...checker.check import MARGIN, goal_boxes, inner_radius, used_portals
+from ...checker.levels import FROM_START, TO_GOAL, Squares
 from ...checker.maps import UnreadableMap, digest_of_cells, read_map
 from ...checker.maps import World as CheckedMap
 from .._kernels import UNLIMITED
@@ -95,7 +95,7 @@ def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str,
     start, goal = (world.own(request[name]) for name in ("start", "goal"))
     goals = goal_boxes(goal, request["goal_tolerance_xy"], request["goal_tolerance_yaw"], length)
     margin = 2 * MARGIN * (length + world.size)
-    box = pose_box(*start)
+    box = goal_boxes(start, 0, 0, 0)
     bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
     return {"bound": max(0.0, bound), "limit": length, "levels": [], "cells": [], "boxes": [],
             "squares": {"corner": [0, 0], "side": 1, "free": []}, "from_start": [], "to_goal": []}
@@ -132,8 +132,8 @@ class _Draft:
             "squares": {"corner": [-side, -side], "side": side,
                         "free": ["".join("01"[is_free] for is_free in row) for row in free.tolist()]},
             "from_start": _rows(from_start), "to_goal": _rows(to_goal)}
-        self._corridor = Corridor(self._document)
-        self._cells = _labelled(self._corridor.parts)
+        self._squares = Squares(self._document)
+        self._cells = _labelled(self._squares.parts)
         self._margin = MARGIN * (self._document["limit"] + world.size)
 
     def proved(self, gap: float, bound: float, is_over: Callable[[], bool]) -> dict[str, Any] | None:
@@ -158,35 +158,34 @@ class _Draft:
                 bound, boxes = potentials.bound, cover.document(potentials.values)
             if bisection.bound < target:
                 break
-        cells = self._cells[self._corridor.parts].tolist()
+        cells = self._cells[self._squares.parts].tolist()
         return None if boxes is None else self._document | {"bound": bound, "cells": cells, "boxes": boxes}
 
     def _cover(self) -> Cover:
-        gates, ends = self._corridor.gates(), self._ends()
-        before, after = (self._cells[slab, gates.row, gates.column].tolist() for slab in (gates.before, gates.after))
-        keys = list(zip(before, after, strict=True))
+        (gates, *parts), ends = self._squares.gates(), self._ends()
+        keys = list(zip(*(self._cells[*some.T].tolist() for some in parts), strict=True))
         return Cover(gates, keys, used_portals(set(keys), ends.start_cell, ends.goal_cells), ends, self._is_blocked, self._margin)
 
     def _ends(self) -> Ends:
         start, goal = (self._world.own(self._request[name]) for name in ("start", "goal"))
         start_cell, cost = self._cell_at(start)
-        tolerance, to_goal = self._request["goal_tolerance_xy"], self._corridor.to_goal
+        tolerance, squares = self._request["goal_tolerance_xy"], self._squares
         goals = goal_boxes(goal, tolerance, self._request["goal_tolerance_yaw"], 0.0)
         if tolerance == 0:
             goal_cell, goals[:, 9] = self._cell_at(goal)
-            cells, excess = {goal_cell}, to_goal.at(*goal[:2])[1]
+            cells, excess = {goal_cell}, squares.at(TO_GOAL, *goal[:2])[1]
         else:
-            near = to_goal.near(*goal[:2], tolerance + 2 * self._margin)
+            near = squares.near(*goal[:2], tolerance + 2 * self._margin)
             cells = set(self._cells[:, near].ravel().tolist()) - {NONE}
-            excess = float(to_goal.corners()[near & self._corridor.domain].max())
-        start_box = pose_box(*start)
+            excess = float(squares.corners[TO_GOAL][near & squares.domain].max())
+        start_box = goal_boxes(start, 0, 0, 0)
         start_box[:, 9] = cost
         return Ends(start_box, goals, start_cell, cells, max(0.0, excess))
 
     def _cell_at(self, pose: tuple[float, float, float]) -> tuple[int, float]:
         """Return the cell of a place, and its cost from the start [m]."""
-        square, cost = self._corridor.from_start.at(*pose[:2])
-        return int(self._cells[int(self._corridor.slabs(cost)), *square]), cost
+        square, cost = self._squares.at(FROM_START, *pose[:2])
+        return int(self._cells[int(self._squares.slabs(cost)), *square]), cost
 
     def _is_blocked(self, boxes: np.ndarray) -> np.ndarray:
         return self._world.clearances(boxes[:, :2], self._inner) + boxes[:, 4] * (1 + 1e-9) + 1e-9 < self._inner

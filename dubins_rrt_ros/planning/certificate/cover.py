@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...checker.levels import Gates
+from ...checker.check import boxes_on
 
 #: The cells before and after a crossing of a level.
 Key = tuple[int, int]
@@ -31,7 +31,7 @@ class Cover:
     """Boxes on the gates between cells; those of a portal, a pair of cells, are crossed in one direction.
 
     Attributes:
-        index, shares: the gates of the boxes, and the ranges of places and headings, as `Gates.boxes` takes them.
+        index, shares: the gates of the boxes, and the ranges of places and headings, as `boxes_on` takes them.
         potentials: (n,) lower bounds of the costs of chains to the boxes [m].
         is_free: (n,) False where a box holds no free place.
         before, after: for each portal those that may be crossed before it, and after it.
@@ -39,11 +39,12 @@ class Cover:
         margin: length that boxes are larger than they need be [m].
     """
 
-    def __init__(self, gates: Gates, keys: list[Key], used: set[Key], ends: Ends, is_blocked: Callable[[np.ndarray], np.ndarray],
-                 margin: float):
+    def __init__(self, gates: np.ndarray, keys: list[Key], used: set[Key], ends: Ends,
+                 is_blocked: Callable[[np.ndarray], np.ndarray], margin: float):
         """Cover each gate with one box.
 
         Args:
+            gates: (n, 11) boxes of all poses in which they are crossed.
             keys: the cells before and after each gate.
             used: the pairs of cells between which paths cross levels.
             is_blocked: says of (n, 11) boxes which hold no free place.
@@ -57,7 +58,7 @@ class Cover:
         number = {key: i for i, key in enumerate(self._used)}
         self.index = np.array([gate for gate, key in enumerate(keys) if key in used], int)
         self._portal = np.array([number[keys[gate]] for gate in self.index], int)
-        self.shares = np.tile((0.0, 1.0, -1.0, 1.0), (len(self.index), 1))
+        self.shares = np.tile((-1.0, 1.0, -1.0, 1.0), (len(self.index), 1))
         self.potentials = np.zeros(len(self.index))
         self.is_free = ~self._is_blocked(self.boxes())
 
@@ -66,11 +67,11 @@ class Cover:
 
     def boxes(self) -> np.ndarray:
         """Return the (n, 11) boxes, as the checker has them."""
-        return self.gates.boxes(self.index, np.column_stack([self.shares, self.potentials]), self.margin)
+        return boxes_on(self.gates[self.index], np.column_stack([self.shares, self.potentials]), self.margin)
 
     def document(self, potentials: np.ndarray) -> list[list[list[float | None]]]:
         """Return the boxes of each gate as a certificate has them, with (n,) potentials [m]."""
-        rows: list[list[list[float | None]]] = [[] for _ in self.gates.cost]
+        rows: list[list[list[float | None]]] = [[] for _ in self.gates]
         for gate, shares, value, is_free in zip(self.index.tolist(), self.shares.tolist(), potentials.tolist(), self.is_free,
                                                 strict=True):
             rows[gate].append([*shares, value if is_free else None])
@@ -85,7 +86,7 @@ class Cover:
     def order(self) -> list[int]:
         """Return the portals that have boxes, in the order of their costs."""
         first = {portal: row for row, portal in reversed(list(enumerate(self._portal.tolist()))) if self.is_free[row]}
-        return sorted(first, key=lambda portal: (self.gates.cost[self.index[first[portal]]], portal))
+        return sorted(first, key=lambda portal: (self.gates[self.index[first[portal]], 9], portal))
 
     def is_first(self, portal: int) -> bool:
         """Return whether a path can cross a portal before all others."""
