@@ -15,13 +15,15 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from dubins_rrt_ros.planning import GridMap, kernels_compiled
 
 DRIVE = Path(__file__).resolve().parents[2] / "examples" / "drive.py"
+#: As a user starts it, so that it finds the file beside it; in another folder, so that it finds the package that is installed.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
 
 
 @pytest.mark.skipif(not kernels_compiled, reason="too slow to drive with interpreted kernels")
 @pytest.mark.parametrize("minutes", [0.05, pytest.param(1, marks=[pytest.mark.slow, pytest.mark.minute])])
-def test_a_car_drives_reaches_goals_and_touches_nothing(record_property, minutes):
+def test_a_car_drives_reaches_goals_and_touches_nothing(record_property, tmp_path, minutes):
     command = [sys.executable, str(DRIVE), "--minutes", str(minutes), "--seed", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=ENVIRONMENT, cwd=tmp_path)
     assert done.returncode == (minutes < 1), done.stdout + done.stderr  # no goal is reached in seconds
     *goals, summary = map(json.loads, done.stdout.splitlines())
     for name, value in summary.items():
@@ -36,7 +38,8 @@ def test_a_car_that_cannot_be_placed_leaves_no_planner_behind(tmp_path):
     (tmp_path / "narrow.yaml").write_text("image: narrow.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
                                           "occupied_thresh: 0.65\nfree_thresh: 0.25\n")
     command = [sys.executable, str(DRIVE), "--map", str(tmp_path / "narrow.yaml")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT, cwd=tmp_path,
+                          start_new_session=True) as process:
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 1
         assert errors.endswith("there is hardly room to drive on this map\n")
