@@ -38,9 +38,9 @@ class World(NamedTuple):
 
     def own(self, pose: Any) -> tuple[float, float, float]:
         """Return a pose (x, y, heading) in the map's own frame."""
-        x, y, yaw = self.origin
-        c, s = math.cos(yaw), math.sin(yaw)
-        return (c * (pose[0] - x) + s * (pose[1] - y), c * (pose[1] - y) - s * (pose[0] - x), pose[2] - yaw)
+        x, y, yaw = (at - own for at, own in zip(pose, self.origin, strict=True))
+        c, s = math.cos(self.origin[2]), math.sin(self.origin[2])
+        return (c * x + s * y, c * y - s * x, yaw)
 
     def touched(self, shapes: np.ndarray, distance: np.ndarray | float) -> np.ndarray:
         """Return the indices of shapes that come nearer than a distance [m] to an obstacle, or begin in one."""
@@ -53,8 +53,7 @@ class World(NamedTuple):
     def clearances(self, points: np.ndarray, most: float) -> np.ndarray:
         """Return the distances [m] of (n, 2) points to the obstacles; infinite beyond `most`."""
         found = np.full(len(points), np.inf)
-        (index, _), distance = self.parts.query_nearest(shapely.points(points), max_distance=most, return_distance=True,
-                                                        all_matches=False)
+        (index, _), distance = self.parts.query_nearest(shapely.points(points), most, return_distance=True, all_matches=False)
         found[index] = distance
         if self.free is not None:
             found[~shapely.contains_xy(self.free, points)] = 0
@@ -79,17 +78,15 @@ def read_map(path: str | Path, allow_unknown: bool) -> World:
 
 
 def _grid(fields: dict[str, Any], folder: Path, allow_unknown: bool) -> World:
-    rules: dict[str, Any] = {"mode": str(fields.get("mode", "trinary")).lower(),
-                             "negate": str(fields["negate"]).lower() in ("1", "true"),
-                             "occupied_thresh": float(fields["occupied_thresh"]), "free_thresh": float(fields["free_thresh"])}
+    rules: dict[str, Any] = {name: float(fields[name]) for name in ("occupied_thresh", "free_thresh")}
+    rules |= {"mode": str(fields.get("mode", "trinary")).lower(), "negate": str(fields["negate"]).lower() in ("1", "true")}
     cells = _occupancies(*_pixels(folder / fields["image"]), **rules)[::-1]  # a picture begins with the row at the top
     blocked = cells >= OCCUPIED_FROM if allow_unknown else (cells > FREE_UP_TO) | (cells == UNKNOWN)
-    side, (x, y, yaw) = float(fields["resolution"]), map(float, fields["origin"])
-    description = {"sha256": digest_of_cells(cells.astype(np.int8)),
-                   "width": cells.shape[1], "height": cells.shape[0], "resolution": side,
+    (height, width), side, (x, y, yaw) = cells.shape, float(fields["resolution"]), map(float, fields["origin"])
+    description = {"sha256": digest_of_cells(cells.astype(np.int8)), "width": width, "height": height, "resolution": side,
                    "origin": [x, y, yaw], **rules}
-    size = side * max(cells.shape)
-    return World(description, (x, y, yaw), size + abs(x) + abs(y), shapely.STRtree(_rectangles(blocked, side)), None)
+    size = side * max(height, width) + abs(x) + abs(y)
+    return World(description, (x, y, yaw), size, shapely.STRtree(_rectangles(blocked, side)), None)
 
 
 def digest_of_cells(cells: np.ndarray) -> str:
@@ -103,8 +100,7 @@ def _pixels(path: Path) -> tuple[np.ndarray, np.ndarray]:
         if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
             raise UnreadableMap(f"{path} has pixels of the mode {image.mode}; save it with 8 bits")
         clear = np.asarray(image.convert("RGBA").getchannel("A")) < 255
-        flat = image.convert("RGBA" if image.mode in ("P", "RGBA") else "RGB") if image.mode in ("P", "RGB", "RGBA") else image
-        return np.asarray(flat.convert("L"), dtype=np.int32), clear
+        return np.asarray((image.convert("RGBA") if image.mode == "P" else image).convert("L"), dtype=np.int32), clear
 
 
 def _occupancies(grey: np.ndarray, clear: np.ndarray, mode: str, negate: bool, occupied_thresh: float,
@@ -125,26 +121,23 @@ def _rectangles(blocked: np.ndarray, side: float) -> np.ndarray:
     """Return rectangles that cover the blocked cells, one for each run in a row, and the outside of the map."""
     edges = np.diff(np.pad(blocked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (rows, begins), (_, ends) = np.nonzero(edges == 1), np.nonzero(edges == -1)
-    runs = shapely.box(begins * side, rows * side, ends * side, (rows + 1) * side)
-    height, width = (side * count for count in blocked.shape)
-    far = 10 * (width + height)
-    outside = shapely.box([-far, width, -far, -far], [-far, -far, -far, height], [0, far, far, far], [far, far, 0, far])
-    return np.concatenate([runs, outside])
+    height, width, far = *blocked.shape, 10 * sum(blocked.shape)
+    outside = [[-far, width, -far, -far], [-far, -far, -far, height], [0, far, far, far], [far, far, 0, far]]
+    return np.asarray(shapely.box(*(side * np.hstack([outside, [begins, rows, ends, rows + 1]]))))
 
 
 def _free_space(path: Path) -> shapely.Geometry:
     """Return the free space of polygons: those of a WKT file, or the bounds of a GeoJSON file less its obstacles."""
-    text = path.read_text("utf-8")
     if path.suffix == ".wkt":
-        return shapely.force_2d(shapely.from_wkt(text))
-    document = json.loads(text)
-    features = document["features"] if document["type"] == "FeatureCollection" else [document]
-    shapes = [shapely.force_2d(shapely.from_geojson(json.dumps(feature["geometry"]))) for feature in features]
-    is_bounds = [(feature.get("properties") or {}).get("role") == "bounds" for feature in features]
-    if sum(is_bounds) != 1:
+        return shapely.force_2d(shapely.from_wkt(path.read_text("utf-8")))
+    document = json.loads(path.read_text("utf-8"))
+    shapes: dict[bool, list[shapely.Geometry]] = {True: [], False: []}
+    for feature in document["features"] if document["type"] == "FeatureCollection" else [document]:
+        is_bounds = (feature.get("properties") or {}).get("role") == "bounds"
+        shapes[is_bounds].append(shapely.force_2d(shapely.from_geojson(json.dumps(feature["geometry"]))))
+    if len(shapes[True]) != 1:
         raise UnreadableMap(f"{path} has not one feature with the role bounds")
-    obstacles = [shape for shape, bounds in zip(shapes, is_bounds, strict=True) if not bounds]
-    return shapely.difference(shapes[is_bounds.index(True)], shapely.union_all(obstacles))
+    return shapely.difference(shapes[True][0], shapely.union_all(shapes[False]))
 
 
 def _polygons(free: shapely.Geometry) -> World:
@@ -153,5 +146,5 @@ def _polygons(free: shapely.Geometry) -> World:
     ends, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(free)), return_index=True)
     edges = shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)[ring[:-1] == ring[1:]])
     shapely.prepare(free)
-    description = {"sha256": hashlib.sha256(shapely.to_wkb(shapely.normalize(free), byte_order=1)).hexdigest()}
-    return World(description, (0.0, 0.0, 0.0), float(np.abs(ends).max()), shapely.STRtree(edges), free)
+    digest = hashlib.sha256(shapely.to_wkb(shapely.normalize(free), byte_order=1)).hexdigest()
+    return World({"sha256": digest}, (0.0, 0.0, 0.0), float(np.abs(ends).max()), shapely.STRtree(edges), free)
