@@ -25,12 +25,12 @@ def test_a_car_drives_reaches_goals_and_touches_nothing(record_property, tmp_pat
     command = [sys.executable, str(DRIVE), "--minutes", str(minutes), "--seed", "1"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=ENVIRONMENT, cwd=tmp_path)
     assert done.returncode == (minutes < 1), done.stdout + done.stderr  # no goal is reached in seconds
-    *goals, summary = map(json.loads, done.stdout.splitlines())
+    *lines, summary = map(json.loads, done.stdout.splitlines())
     for name, value in summary.items():
         record_property(name, value)
     assert summary["touched"] == 0
     assert summary["reached"] >= (minutes >= 1)
-    assert all(goal["least_room"] >= 0 for goal in goals)
+    assert all(line["least_room"] >= 0 for line in lines if "goal" in line)  # others tell of long times without a path
 
 
 def test_a_car_that_cannot_be_placed_leaves_no_planner_behind(tmp_path):
