@@ -36,14 +36,40 @@ from dubins_rrt_ros.planning.stops import least_length, legs_along, stops_of
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.5, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.5, -0.2)], turning_radius=0.8)
-SETTINGS = Settings(samples=200, planning_time=120.0, seed=1, preferred_clearance=0.0)
+SETTINGS = Settings(samples=scaled(200, least=20), planning_time=300.0, seed=1, preferred_clearance=0.0)
+#: Of searches that end with their first path.
+FIRST = replace(SETTINGS, planner="rrt")
 #: Free places of the yard, around its box.
 BELOW, ABOVE = (5.0, 3.0), (5.0, 7.0)
+WITH_HEADINGS = [(*BELOW, 0.5), (*ABOVE, 0.5)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _first_headings():
+    """Fewer drafts of a leg between obstacles, each of them with interpreted kernels a second."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(waypoints, "FIRST_HEADINGS", scaled(waypoints.FIRST_HEADINGS, least=3))
+        yield
 
 
 @pytest.fixture(scope="module")
 def world():
     return prepare(GridMap(yard(), 0.1), DISC)
+
+
+@pytest.fixture(scope="module")
+def over_both(world):
+    """The answer over the places below and above, with any heading; and the first path that was reported."""
+    reports = []
+    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, on_progress=reports.append)
+    answer.check()
+    return answer, reports
+
+
+@pytest.fixture(scope="module")
+def known(world):
+    """The first path over these places with headings that are given."""
+    return plan_through(Problem(world, start=START, goal=GOAL), WITH_HEADINGS, FIRST).path
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +119,7 @@ def leg_by_leg(places, start, goal, headings=72):
 def test_in_the_open_plane_the_whole_is_shortest(plane):
     rng = np.random.default_rng(4)
     shorter = differs = 0
-    for _ in range(scaled(30, least=1)):
+    for _ in range(scaled(15, least=1)):
         places = 40 + rng.uniform(0, rng.choice([3.0, 6.0, 15.0]), (4, 2))
         start, goal = (*places[0], rng.uniform(-3, 3)), (*places[3], rng.uniform(-3, 3))
         answer = through(plane, *places[1:3], start=start, goal=goal)
@@ -120,7 +146,7 @@ def test_where_waypoints_have_headings_the_bound_is_the_sum_of_what_is_proved_of
 
 
 @needs_compiled
-def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_legs(world):
+def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_legs(world, over_both):
     headings = np.arange(8) * math.tau / 8
     stops = [[START], [(*BELOW, heading) for heading in headings], [(*ABOVE, heading) for heading in headings], [GOAL]]
     quick = Settings(planner="rrt", planning_time=0.1, seed=1)
@@ -128,7 +154,7 @@ def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_leg
     for here, there in pairwise(stops):
         legs = [[plan(Problem(world, start=start, goal=goal), quick).length or math.inf for goal in there] for start in here]
         cost = (cost[:, None] + np.array(legs)).min(axis=0)
-    answer = through(world, BELOW, ABOVE)
+    answer, _ = over_both
     assert_passed(answer, BELOW, ABOVE)
     assert answer.length <= cost[0] * 1.005
 
@@ -194,7 +220,7 @@ def test_a_leg_without_a_path_tells_why_where_that_holds_of_all_headings(heading
     cells = np.full((60, 200), 100, np.int8)
     cells[18:42] = 0
     corridor = Problem(GridMap(cells, 0.1), Vehicle(1.5, 0.3), (10.0, 3.0, 0.0), (2.0, 3.0, math.pi))
-    answer = plan_through(corridor, [(5.0, 3.0, *heading)], replace(SETTINGS, informed=False))  # ended by samples, not by time
+    answer = plan_through(corridor, [(5.0, 3.0, *heading)], replace(SETTINGS, samples=200, informed=False))  # ended by samples
     assert answer.status == Status.TIMEOUT
     assert "On the way to waypoint 1 at (5.000, 3.000): No path found within 100 samples, the leg's share; " in answer.message
     assert "turn the start or the goal" in answer.message and answer.message.endswith("or allow more samples.")
@@ -219,8 +245,8 @@ def test_what_is_no_waypoint_is_refused(world, pose):
         through(world, BELOW, pose)
 
 
-def test_the_same_seed_gives_the_same_path(world):
-    assert through(world, BELOW, ABOVE).path == through(world, BELOW, ABOVE).path
+def test_the_same_seed_gives_the_same_path(world, over_both):
+    assert through(world, BELOW, ABOVE).path == over_both[0].path
 
 
 def test_a_cancelled_request_has_no_path(world):
@@ -229,9 +255,8 @@ def test_a_cancelled_request_has_no_path(world):
     assert answer.status == Status.CANCELLED or answer.cancelled
 
 
-def test_the_first_path_is_reported(world):
-    reports = []
-    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, on_progress=reports.append)
+def test_the_first_path_is_reported(over_both):
+    answer, reports = over_both
     first = reports[0].snapshot()
     assert reports[0].improved
     assert first.audit.ok
@@ -248,7 +273,7 @@ def test_a_path_that_there_is_no_time_to_audit_is_no_answer_and_the_one_before_i
         audited.append(path)
         return audit_path(path, *given)
     monkeypatch.setattr(waypoints, "audit_path", audit)
-    answer = through(world, BELOW, ABOVE)
+    answer = through(world, *WITH_HEADINGS)
     assert (answer.status, answer.path) == (status, audited[0] if audited else None)
     assert status == Status.NONE or "no time left to audit it" in answer.message
 
@@ -261,13 +286,13 @@ def test_a_request_that_is_cancelled_during_its_first_audit_is_cancelled(world, 
         while True:
             check_time()
     monkeypatch.setattr(waypoints, "audit_path", audit)
-    answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, cancel=cancelled.is_set)
+    answer = plan_through(Problem(world, start=START, goal=GOAL), WITH_HEADINGS, SETTINGS, cancel=cancelled.is_set)
     answer.check()
     assert answer.status == Status.CANCELLED and answer.path is None
 
 
-def test_the_audit_finds_a_waypoint_that_is_not_passed(world):
-    path = through(world, BELOW, ABOVE).path
+def test_the_audit_finds_a_waypoint_that_is_not_passed(over_both):
+    path = over_both[0].path
     assert not list(passing_findings(path, [(*BELOW, None), (*BELOW, None), (*ABOVE, None)]))
     for wrong in ([(*ABOVE, None), (*BELOW, None)], [(5.0, 3.001, None)], [(*BELOW, 9.0)]):
         assert "does not pass waypoint" in next(passing_findings(path, wrong))
@@ -287,25 +312,18 @@ def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_
             assert plan_through(Problem(world, start=start, goal=goal), [waypoint], settings).solved
 
 
-#: Of searches that end with their first path.
-FIRST = replace(SETTINGS, planner="rrt")
-WITH_HEADINGS = [(*BELOW, 0.5), (*ABOVE, 0.5)]
-
-
-@pytest.mark.parametrize("waypoints", [WITH_HEADINGS, [BELOW, ABOVE]], ids=["headings given", "any heading"])
-def test_a_path_that_is_known_is_where_it_begins(world, waypoints):
-    problem = Problem(world, start=START, goal=GOAL)
-    rest = plan_through(problem, waypoints, FIRST).path.after(0.7)
-    again = plan_through(replace(problem, start=rest.start), waypoints, FIRST, seed_path=rest)
+@pytest.mark.parametrize("given", [True, False], ids=["headings given", "any heading"])
+def test_a_path_that_is_known_is_where_it_begins(world, known, over_both, given):
+    rest = (known if given else over_both[0].path).after(0.7)
+    again = plan_through(Problem(world, start=rest.start, goal=GOAL), WITH_HEADINGS if given else [BELOW, ABOVE], FIRST,
+                         seed_path=rest)
     again.check()
     assert again.found_by == "seed_path"
     assert again.length <= rest.length + 1e-9
 
 
-def test_a_leg_of_a_known_path_that_is_blocked_is_planned_anew(world):
-    problem = Problem(world, start=START, goal=GOAL)
-    known = plan_through(problem, WITH_HEADINGS, FIRST).path
-    last = legs_along(known, list(stops_of(problem, WITH_HEADINGS)))[-1]
+def test_a_leg_of_a_known_path_that_is_blocked_is_planned_anew(world, known):
+    last = legs_along(known, list(stops_of(Problem(world, start=START, goal=GOAL), WITH_HEADINGS)))[-1]
     x, y, _ = last.at(np.array([0.5]))[0]
     cells = yard()
     cells[int(10 * y) - 1:int(10 * y) + 2, int(10 * x) - 1:int(10 * x) + 2] = 100
@@ -316,11 +334,11 @@ def test_a_leg_of_a_known_path_that_is_blocked_is_planned_anew(world):
     assert again.path.start == START and again.length > known.length
 
 
-def test_a_path_that_passes_other_places_is_no_seed(world):
+def test_a_path_that_passes_other_places_is_no_seed(world, known):
     problem = Problem(world, start=START, goal=GOAL)
     other = plan(problem, FIRST).path
     assert legs_along(other, list(stops_of(problem, WITH_HEADINGS))) is None
-    assert plan_through(problem, WITH_HEADINGS, FIRST, seed_path=other).path == plan_through(problem, WITH_HEADINGS, FIRST).path
+    assert plan_through(problem, WITH_HEADINGS, FIRST, seed_path=other).path == known
 
 
 def test_the_cheapest_chain_is_that_of_all_chains():
