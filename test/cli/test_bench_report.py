@@ -214,6 +214,7 @@ def test_the_plot_of_short_runs_names_major_ticks_alone():
     assert "<!-- 10 ms -->" in text and "times10" not in text
 
 
+@pytest.mark.slow
 def test_the_plot_takes_runs_of_any_kind():
     """None solved, the start the goal, and more planners than kinds of line."""
     many = [run("yard", f"planner {i}", 0, (0.1, 10 + i)) for i in range(24)]

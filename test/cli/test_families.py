@@ -12,7 +12,8 @@ from dubins_rrt_ros.evaluation.families.problems import FAMILIES, constructed
 from dubins_rrt_ros.planning import Path, Settings, audit_path
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", [
+    pytest.param(family, marks=pytest.mark.slow if "footprint" in family else ()) for family in FAMILIES])
 def test_the_constructed_path_is_free_with_the_room_it_tells(family):
     for number in range(3):
         problem = constructed(family, 1, number)
@@ -49,6 +50,7 @@ def test_wrong_usage_is_refused(flags, words, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_ways_are_compared_with_the_best_that_is_known(monkeypatch):
     for name, value in {"SEEDS": 2, "REFERENCE_SAMPLES": 64, "CLOSED_PLACES": 2, "CLOSED_TIME": 0.2}.items():

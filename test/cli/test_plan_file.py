@@ -96,7 +96,7 @@ def test_a_search_that_was_cut_short_is_cut_at_the_same_sample(answer, hall, mon
 
 @pytest.mark.parametrize("options", [{}, {"preferred_clearance": 0.5}, {"step_size": 0.5}, {"informed": False, "goal_bias": 0.3}],
                          ids=["length", "clearance", "step", "plain"])
-@pytest.mark.parametrize("footprint", [False, True], ids=["disc", "footprint"])
+@pytest.mark.parametrize("footprint", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["disc", "footprint"])
 def test_what_the_clock_cuts_short_is_planned_again_bit_for_bit(hall, options, footprint, monkeypatch):
     """Wherever it does: at each look at the clock a little time has gone by, so that the time is up after so many looks."""
     vehicle = Vehicle(0.8, footprint=((0.5, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.5, -0.2))) if footprint else Vehicle(0.8, 0.3)

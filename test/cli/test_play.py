@@ -261,7 +261,7 @@ def test_an_edited_map_plans_as_one_that_is_prepared_anew(tmp_path):
     assert edited.path == plan(Problem(bench.map, Vehicle(), START, GOAL), settings).path
 
 
-@pytest.mark.parametrize("via", [[], [[4.5, 5.0], [10.0, 7.5, 0.3]]])
+@pytest.mark.parametrize("via", [[], pytest.param([[4.5, 5.0], [10.0, 7.5, 0.3]], marks=pytest.mark.slow)])
 def test_what_is_copied_plans_the_same(server, via, capsys, monkeypatch, tmp_path):
     async def copied(page):
         await page.plan(1, via=via, vehicle={"turning_radius": 1.2}, problem={"any_goal_heading": True}, settings={

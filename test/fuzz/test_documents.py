@@ -43,6 +43,7 @@ def test_the_documents_are_good_before_they_are_spoiled(folder):
     assert read_cases(str(folder / "good.json"))[0].vehicle == Vehicle()
 
 
+@pytest.mark.slow
 @fuzz
 @given(content=json_of([[CASE, {**CASE, "name": "again", "check_step": 0.1}], [CASE]]))
 def test_problems(folder, content):

@@ -28,6 +28,7 @@ CONTRACT = {
     "max_map_cells", "map_directory", "replan_on_map_change",
 }
 CONFIG = Path(__file__).parents[2] / "config" / "planner.yaml"
+ONE_OF_EACH_TYPE = {OPTIONS[name].type: name for name in sorted(OPTIONS)}.values()
 
 
 @pytest.fixture(scope="module")
@@ -183,7 +184,8 @@ def test_what_shapes_the_topics_cannot_change_at_run_time(declared, name):
     assert ("~/load_map" in reason) == (name == "map_file")
 
 
-@pytest.mark.parametrize("name", sorted(OPTIONS))
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=() if name in ONE_OF_EACH_TYPE else pytest.mark.slow) for name in sorted(OPTIONS)])
 def test_every_value_of_another_type_is_refused_in_one_line(declared, name):
     kind, node = OPTIONS[name].type, declared()
     for value in [None, [], [b"a"], [True], [1, 2], [0.5], ["two\nlines"], array.array("q", [1]), "two\nlines", True, 7, 0.5]:

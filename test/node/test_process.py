@@ -93,6 +93,7 @@ def assert_ends_with_one_line(process, words):
     assert [word for word in words if word not in lines[0]] == [], lines[0]
 
 
+@pytest.mark.slow
 def test_a_broken_map_file_ends_it_with_one_line(installed_planners, map_yaml):
     broken = map_yaml.with_name("broken.yaml")
     broken.write_text(map_yaml.read_text().replace("resolution: 0.1", "resolution: -0.1"))

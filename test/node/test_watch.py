@@ -134,6 +134,7 @@ def test_what_cannot_be_done_is_refused_in_a_sentence(watched, document, words):
     assert words in talk(watched[2], ask)
 
 
+@pytest.mark.slow
 def test_in_a_browser_a_drag_sends_the_goal_and_the_path_appears(watched):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import WebDriverWait

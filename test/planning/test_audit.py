@@ -237,7 +237,8 @@ def random_points(rng, map, count):
 
 
 @pytest.mark.parametrize("allow_unknown", [False, True])
-@pytest.mark.parametrize("side, blocked", [(700, 0), (700, 1), (1500, 1), (1500, 12), (2500, 3)])
+@pytest.mark.parametrize("side, blocked", [(700, 0), (700, 1), (1500, 1), (1500, 12),
+                                           pytest.param(2500, 3, marks=pytest.mark.slow)])
 def test_the_clearance_of_a_point_is_exact_however_far_the_obstacles(side, blocked, allow_unknown):
     rng = np.random.default_rng(side + blocked)
     map = sparse_grid(rng, side, blocked)
@@ -307,7 +308,7 @@ def test_a_bend_along_a_round_wall_is_decided():
 
 
 def test_the_time_is_looked_at_between_portions_of_a_path_of_many_curves():
-    count, step = 20_000, 0.01
+    count, step = 6000, 0.01
     curves = [DubinsCurve((i * step, 0.0, 0.0), 1.0, "LSL", (0.0, step, 0.0)) for i in range(count)]
     start, end = (0.0, 0.0, 0.0), curves[-1].end
     problem = Problem(GridMap(np.zeros((40, 2040)), 0.1, (-2.0, -2.0, 0.0)), Vehicle(robot_radius=0.1), start, end)

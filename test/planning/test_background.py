@@ -102,7 +102,7 @@ def test_what_a_request_leaves_behind_does_not_wait_for_the_garbage_collector(pl
     try:
         before = kernels_alive()
         for seed in range(3):
-            plan(problem, Settings(planner=planner, samples=300, seed=seed, preferred_clearance=preferred_clearance))
+            plan(problem, Settings(planner=planner, samples=100, seed=seed, preferred_clearance=preferred_clearance))
         while kernels_alive() > before:  # as long as something is under way in the background
             time.sleep(0.01)
     finally:

@@ -245,7 +245,7 @@ def test_the_distances_that_guide_it_are_not_changed():
 def test_the_heap_of_a_run_orders_as_heapq_does():
     heap = interpreted("heap").Heap
     rng = np.random.default_rng(1)
-    for _ in range(scaled(200, least=20)):
+    for _ in range(scaled(60, least=20)):
         expected, keys, item = [], heap(0), 0
         for _ in range(500):
             keys.reserve(1)
@@ -266,7 +266,7 @@ def test_the_heap_of_a_run_orders_as_heapq_does():
 def test_a_lattice_remembers_the_costs_of_its_cells():
     """Poses, headings beyond pi among them, are in one cell where rows, columns and sectors by another formula are the same."""
     rng = np.random.default_rng(2)
-    for _ in range(scaled(40, least=4)):
+    for _ in range(scaled(16, least=4)):
         corner, extent, side = rng.uniform(-50, 50, 2), rng.uniform(0.1, 9, 2), rng.uniform(0.2, 1)
         sectors = int(rng.integers(1, 40))
         lattice, costs, seen = interpreted("closed_set").ClosedSet(corner, extent, side, sectors), {}, 0
