@@ -56,6 +56,7 @@ def refusal(*argv, capsys):
     return error
 
 
+@pytest.mark.slow
 def test_what_is_overridden_or_in_degrees_is_told_once():
     footprint = "[[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]"
     file = problems(entry(footprint=footprint), entry(name="other", footprint=footprint, start=[-4.0, -3.0, 90.0]))

@@ -293,6 +293,7 @@ def test_a_terminal_sees_a_bar(hall):
     assert "/150" in shown and "%" in shown and "limit 60 s" in shown
 
 
+@pytest.mark.slow
 def test_ctrl_c_gives_the_best_path_so_far(hall):
     budget = ["--samples", "10000000", "--planning-time", "3600", "--seed", "4"]
     status, out, shown = on_a_terminal([hall, *REQUEST, *budget, "--json", "p.json"], interrupt_at=b"path ")

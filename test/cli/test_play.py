@@ -297,6 +297,7 @@ def test_a_large_grid_is_shown_smaller_and_no_wall_vanishes():
 
 # The command.
 
+@pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_by_ctrl_c(tmp_path):
     with subprocess.Popen([sys.executable, "-m", "dubins_rrt_ros", "play", "--no-browser"], cwd=tmp_path, text=True,
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | {"PYTHONUNBUFFERED": "1"}) as process:

@@ -40,6 +40,7 @@ def test_a_full_disk_is_told_in_one_line(words):
     assert error.endswith("dubins_rrt plan: error: the output cannot be written: No space left on device\n")
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_without_a_standard_output_it_plans_all_the_same(tmp_path):
     command = f"exec {sys.executable} -m dubins_rrt_ros {' '.join(PLAN)} --json {tmp_path / 'plan.json'} >&-"

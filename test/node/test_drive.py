@@ -20,7 +20,8 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYT
 
 
 @pytest.mark.skipif(not kernels_compiled, reason="too slow to drive with interpreted kernels")
-@pytest.mark.parametrize("minutes", [0.05, pytest.param(1, marks=[pytest.mark.slow, pytest.mark.minute])])
+@pytest.mark.slow
+@pytest.mark.parametrize("minutes", [0.05, pytest.param(1, marks=pytest.mark.minute)])
 def test_a_car_drives_reaches_goals_and_touches_nothing(record_property, tmp_path, minutes):
     command = [sys.executable, str(DRIVE), "--minutes", str(minutes), "--seed", "1"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=ENVIRONMENT, cwd=tmp_path)
@@ -63,6 +64,7 @@ def corridor(person: float | None = None) -> GridMap:
     return GridMap(cells, 0.05, (0.0, 0.0, 0.0), percent=True)
 
 
+@pytest.mark.slow
 def test_a_planner_is_not_blamed_for_somebody_in_the_only_way_far_ahead(drive):
     start, goal = (1.0, 0.75, 0.0), (19.0, 0.75, 0.0)
     views = [(0.0, corridor()), (0.3, corridor(person=12.0)), (2.0, corridor()), (2.4, corridor()), (3.2, corridor(person=15.0))]

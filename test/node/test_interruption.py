@@ -42,6 +42,7 @@ rclpy.shutdown()
 """
 
 
+@pytest.mark.slow
 def test_rclpy_takes_no_signals_as_its_thread_uses_what_executors_that_end_have_freed():
     assert said(CONFIGURED).splitlines()[-1] == "NO"
 

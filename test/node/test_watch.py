@@ -24,7 +24,17 @@ PATIENCE = 60.0
 @pytest.fixture
 def watched(planners, map_yaml):
     """A planner, and the server of a page that watches it."""
-    process = planners.start(map_file=str(map_yaml), **QUICK)
+    yield from watching(planners, map_yaml)
+
+
+@pytest.fixture(scope="module")
+def watched_by_all(module_planners, map_file):
+    """The same for all tests that change nothing."""
+    yield from watching(module_planners, map_file)
+
+
+def watching(planners, map_file):
+    process = planners.start(map_file=str(map_file), **QUICK)
     process.wait_until_ready()
     listener = Listener(process.name)
     try:
@@ -127,11 +137,11 @@ def test_parameters_are_shown_and_set_and_a_refusal_is_told(watched):
     ({"type": "pose", "name": "start", "pose": [1, 2]}, "start pose"),
     ({"type": "pose", "name": "end", "pose": START}, "no pose"),
     ({"type": "load", "name": "x"}, "load"), ({"type": "pose"}, "name")])
-def test_what_cannot_be_done_is_refused_in_a_sentence(watched, document, words):
+def test_what_cannot_be_done_is_refused_in_a_sentence(watched_by_all, document, words):
     async def ask(page):
         await page.send(**document)
         return (await page.receive("refused"))["message"]
-    assert words in talk(watched[2], ask)
+    assert words in talk(watched_by_all[2], ask)
 
 
 @pytest.mark.slow

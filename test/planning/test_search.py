@@ -270,8 +270,8 @@ def test_a_smaller_turning_radius_hardly_makes_a_path_longer(turning_radius):
     rng = np.random.default_rng(1)
     cells = np.where(np.kron(rng.random((50, 50)) < 0.1, np.ones((8, 8), bool)), 100, 0).astype(np.int8)
     cells[:16, :16] = cells[-16:, -16:] = 0
-    lengths = {}
+    settings, lengths = Settings(seed=1, planning_time=60.0), {}
     for radius in (1.0, turning_radius):
         vehicle = Vehicle(radius, 0.2)
-        lengths[radius] = plan(Problem(GridMap(cells, 0.1), vehicle, (0.8, 0.8, 0.8), (39.2, 39.2, 0.8)), Settings(seed=1)).length
+        lengths[radius] = plan(Problem(GridMap(cells, 0.1), vehicle, (0.8, 0.8, 0.8), (39.2, 39.2, 0.8)), settings).length
     assert lengths[turning_radius] <= 1.02 * lengths[1.0]

@@ -145,6 +145,7 @@ def test_where_waypoints_have_headings_the_bound_is_the_sum_of_what_is_proved_of
     assert plan_through(maze, free, settings).lower_bound == least_length(maze, [(*place[:2], None)], {})
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_legs(world, over_both):
     headings = np.arange(8) * math.tau / 8
@@ -298,6 +299,7 @@ def test_the_audit_finds_a_waypoint_that_is_not_passed(over_both):
         assert "does not pass waypoint" in next(passing_findings(path, wrong))
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_cross():
     vehicle = Vehicle(1.0, 0.3)
