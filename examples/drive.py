@@ -5,7 +5,8 @@
 
 The car follows `plan` by pure pursuit, with noise in its pose and lag in its steering. It is planned for with a radius 0.1 m
 larger than its body. One line of JSON tells of each goal, and a last one of the whole drive; a judge that is not the planner
-measures, from true poses, how near the body came to what was on the map. `without_path` is the longest time without a path,
+measures, from true poses, how near the body came to what was on the map. A path that the planner calls broken is not driven
+on: the one in its place begins where the car was then. `without_path` is the longest time without a path to drive on,
 `standstill` the longest in which the map that the planner had shows a way: that is planned again after the drive, with
 JUDGING_TIME for each map; so people in the only way count for nothing, wherever they stand. The exit status is 1 if the car
 touched anything or reached no goal: how long it stood still depends on how busy the machine is, too.
@@ -26,6 +27,8 @@ from typing import NamedTuple
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
+from course import Course
+from diagnostic_msgs.msg import DiagnosticStatus
 from floor import BODY, NO_ROOM, PERSON, Floor
 from geometry_msgs.msg import PoseArray, PoseStamped
 from nav_msgs.msg import OccupancyGrid
@@ -122,12 +125,12 @@ class Car:
         self._routes = node.create_publisher(PoseArray, "goal_poses", 1)
         self._maps = node.create_publisher(OccupancyGrid, "map", LATCHED)
         node.create_subscription(PathMessage, "plan", self._on_plan, LATCHED)
+        node.create_subscription(DiagnosticStatus, "planner/status", lambda message: self._course.hear(message), LATCHED)
         self._home = self._random_home()
         self.pose = np.array(self._home)
         self._last_place = self._home
         self._curvature = 0.0
-        self._plan = np.empty((0, 3))
-        self._at = 0  # index of the pose that was passed last
+        self._course = Course()
         self._route: list[np.ndarray] = []
         self.results: list[dict] = []  # of goals that ended
         self.result: dict = {}  # of the one that is driven to
@@ -152,12 +155,10 @@ class Car:
         self._planner.wait()
 
     def _on_plan(self, message: PathMessage) -> None:
-        poses = [(p.pose.position.x, p.pose.position.y, 2 * math.atan2(p.pose.orientation.z, p.pose.orientation.w))
-                 for p in message.poses]
-        self._plan, self._at = np.array(poses).reshape(-1, 3), 0
-        self.result["plans"] += len(poses) > 0
-        if len(poses) and "shortest" not in self.result:
-            self.result["shortest"] = float(np.hypot(*np.diff(self._plan[:, :2], axis=0).T).sum())
+        self._course.take(message)
+        self.result["plans"] += len(message.poses) > 0
+        if message.poses and "shortest" not in self.result:
+            self.result["shortest"] = self._course.length
 
     def _random_pose(self, room: float) -> tuple[float, float, float]:
         x, y = self._floor.random_place(room)
@@ -194,7 +195,7 @@ class Car:
         self._route = [np.array(place) for place in places]
         self.result = {"car": self.namespace, "goal": [round(a, 3) for a in places[-1]], "waypoints": len(places) - 1,
                         "reached": False, "seconds": 0.0, "driven": 0.0, "plans": 0, "without_path": 0.0, "least_room": math.inf}
-        self._plan, self._wait = np.empty((0, 3)), None
+        self._course, self._wait = Course(), None
         message = PoseArray(poses=[pose_message(place) for place in places])
         message.header.frame_id = "map"
         self._routes.publish(message)
@@ -235,7 +236,7 @@ class Car:
         self._judge_goal()
 
     def _wait_for_path(self, seconds: float) -> None:
-        if len(self._plan):
+        if self._course.is_free:
             self._wait = None
             return
         if not self._wait:
@@ -250,7 +251,7 @@ class Car:
         goal, result = self._route[-1], self.result
         off = abs(math.remainder(self.pose[2] - goal[2], 2 * math.pi))
         at_goal = math.dist(self.pose[:2], goal[:2]) <= REACHED_XY and off <= REACHED_YAW
-        result["reached"] = at_goal and (self._at > len(self._plan) - 20 or not result["waypoints"])
+        result["reached"] = at_goal and (len(self._course.ahead) < 20 or not result["waypoints"])
         if result["reached"] or result["seconds"] > PATIENCE:
             self.results.append({name: round(value, 3) if isinstance(value, float) else value for name, value in result.items()})
             print(json.dumps(self.results[-1]), flush=True)
@@ -261,15 +262,7 @@ class Car:
     def _steered(self) -> float:
         """Return the curvature towards the point of the path that is a lookahead away (pure pursuit)."""
         x, y, yaw = self.pose
-        path = self._plan
-        ahead = path[self._at:self._at + 100]
-        self._at += int(np.argmin(np.hypot(ahead[:, 0] - x, ahead[:, 1] - y)))
-        lengths = np.cumsum(np.hypot(*np.diff(path[self._at:, :2], axis=0).T))
-        if len(lengths) and lengths[-1] > LOOKAHEAD:
-            tx, ty = path[self._at + 1 + int(np.searchsorted(lengths, LOOKAHEAD)), :2]
-        else:
-            beyond = LOOKAHEAD - (lengths[-1] if len(lengths) else 0.0)
-            tx, ty = path[-1, 0] + beyond * math.cos(path[-1, 2]), path[-1, 1] + beyond * math.sin(path[-1, 2])
+        tx, ty = self._course.point_ahead(x, y, LOOKAHEAD)
         across = -(tx - x) * math.sin(yaw) + (ty - y) * math.cos(yaw)
         curvature = 2 * across / max((tx - x) ** 2 + (ty - y) ** 2, 1e-6)
         return max(-MOST_CURVATURE, min(MOST_CURVATURE, curvature))
@@ -283,7 +276,7 @@ class Car:
         return self._leads_nearer(places, LOOK) or self._leads_nearer([other[:2] for other in with_way], LOOK_FOR_CARS)
 
     def _leads_nearer(self, places: list[np.ndarray], look: int) -> bool:
-        ahead = self._plan[self._at:self._at + look, :2]
+        ahead = self._course.ahead[:look, :2]
         if not len(ahead) or not places:
             return False
         now = np.hypot(*(self.pose[:2] - np.array(places)).T)

@@ -12,7 +12,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from dubins_rrt_ros.planning import GridMap, kernels_compiled
+from builtin_interfaces.msg import Time
+
+from dubins_rrt_ros.node.conversions import path_message, status_message
+from dubins_rrt_ros.planning import GridMap, Status, kernels_compiled
 
 DRIVE = Path(__file__).resolve().parents[2] / "examples" / "drive.py"
 #: As a user starts it, so that it finds the file beside it; in another folder, so that it finds the package that is installed.
@@ -73,3 +76,37 @@ def test_a_planner_is_not_blamed_for_somebody_in_the_only_way_far_ahead(drive):
     assert judged["without_path"] == 5.0
     assert judged["standstill"] == pytest.approx(1.2)
     assert judged["pose"] == list(start) and judged["places"] == [list(goal)]
+
+
+@pytest.fixture
+def course(monkeypatch):
+    """Return the path of a car, as the example has it, before one has come."""
+    monkeypatch.syspath_prepend(str(DRIVE.parent))
+    return importlib.import_module("course").Course()
+
+
+def test_a_path_is_not_driven_on_once_it_is_broken_until_another_one_has_come(course):
+    first, second = (path_message(np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), "map", Time(sec=n)) for n in (1, 2))
+    nothing = path_message(np.empty((0, 3)), "map", Time(sec=3))
+    broken = status_message("/planner", Status.NO_VALID_PATH, "The map changed.", plan_id=1, is_warning=True)
+    there = status_message("/planner", Status.NONE, "Path of 1.00 m.", plan_id=2, stamp=second.header.stamp)
+    assert not course.is_free
+    course.take(first)
+    assert course.is_free
+    course.hear(broken)
+    assert not course.is_free
+    course.take(second)
+    assert course.is_free
+    course.hear(broken)  # came later than what is in its place
+    course.hear(there)
+    assert course.is_free
+    course.take(nothing)
+    assert not course.is_free
+
+
+def test_a_car_is_steered_towards_the_path_ahead_of_it_and_straight_on_beyond_its_end(course):
+    course.take(path_message(np.array([(0.1 * n, 0.0, 0.0) for n in range(11)]), "map", Time()))
+    assert course.length == pytest.approx(1.0)
+    assert course.point_ahead(0.32, 0.1, 0.45) == pytest.approx((0.8, 0.0))
+    assert course.ahead[0, 0] == pytest.approx(0.3)
+    assert course.point_ahead(0.8, -0.1, 0.5) == pytest.approx((1.3, 0.0))
