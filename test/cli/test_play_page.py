@@ -116,6 +116,13 @@ def is_like(colour, wanted, most=40):
 ORANGE, WHITE, WALL = (0xd5, 0x5e, 0x00), (255, 255, 255), (70, 70, 70)
 
 
+def test_on_a_small_screen_the_legend_covers_no_map(page):
+    assert page.find("#legend").is_displayed()
+    for size in ((640, 450), (1280, 520)):
+        page.browser.set_window_size(*size)
+        page.wait_for("a hidden legend", lambda: not page.find("#legend").is_displayed())
+
+
 def test_it_opens_with_a_path_in_the_picture(page):
     assert page.find("#title").text.startswith("Path of ") and "no path is shorter than" in page.find("#figures").text
     path = page.path()

@@ -145,6 +145,24 @@ def test_what_cannot_be_done_is_refused_in_a_sentence(watched_by_all, document, 
 
 
 @pytest.mark.slow
+def test_waypoints_of_another_node_are_shown_until_a_goal_without_comes(watched):
+    listener = watched[1]
+
+    async def follow(page):
+        via = []
+        listener.send_waypoints([(1.0, 2.0)], GOAL)
+        while not via:
+            via = (await page.receive("poses"))["via"]
+        shown = via
+        await page.send(type="pose", name="goal", pose=GOAL)
+        while via:
+            via = (await page.receive("poses"))["via"]
+        return shown
+    until(lambda: listener._publishers["goal_poses"].get_subscription_count() > 1)
+    assert talk(watched[2], follow) == [[1.0, 2.0]]
+
+
+@pytest.mark.slow
 def test_in_a_browser_a_drag_sends_the_goal_and_the_path_appears(watched):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import WebDriverWait

@@ -272,9 +272,12 @@ export class View {
   drawCause() {
     const place = this.answer && this.answer.location;
     if (!place) { return; }
-    const size = 9 * this.pixel, [x, y] = place;
-    this.line([[x - size, y - size], [x + size, y + size]], COLOURS.cause, 5 * this.pixel);
-    this.line([[x - size, y + size], [x + size, y - size]], COLOURS.cause, 5 * this.pixel);
+    const { context } = this;
+    context.beginPath();
+    context.arc(place[0], place[1], 11 * this.pixel, 0, 2 * Math.PI);  // around it, so that it stays in sight
+    context.strokeStyle = COLOURS.cause;
+    context.lineWidth = 4 * this.pixel;
+    context.stroke();
   }
 
   // Drive along the path, at such a speed that it takes some seconds.

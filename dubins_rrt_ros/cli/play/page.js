@@ -11,6 +11,7 @@ const STORE = "dubins_rrt play";
 
 let socket = null, options = null, changed = {}, tool = "move", held = null, restTimer = 0;
 let number = 0, dirty = null, sent = new Map(), times = [], lastFiles = [], firstOf = 0;
+let lastVia = "[]";       // the waypoints that came last, of a node's goal
 let isWatching = false;   // the page of `dubins_rrt watch`: a node plans, and what is dragged is sent when it is let go
 
 // What tests and the curious may read: the number of answers, and the times from mouse to picture [ms].
@@ -64,6 +65,8 @@ const receivers = {
     options = message.options;
     isWatching = message.watch === true;
     document.body.classList.toggle("watching", isWatching);
+    document.title = `dubins_rrt ${isWatching ? "watch" : "play"}`;
+    $("command").textContent = document.title;
     if (isWatching) { options.settings = [...options.vehicle, ...options.settings]; changed = {}; }
     showFiles(message.files);
     makeSettings();
@@ -103,6 +106,8 @@ const receivers = {
   poses(message) {
     if (held) { return; }
     for (const name of ["start", "goal"]) { view[name] = message[name] || view[name]; }
+    const via = JSON.stringify(message.via);  // what was added on the page stays until a goal with others comes
+    if (via !== lastVia) { lastVia = via; view.via = message.via; }
     view.request();
   },
   parameters({ values }) {
@@ -134,14 +139,14 @@ function receive(data) {
 }
 
 function showFigures(answer) {
-  const metres = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)} m`), time = (value) => (value === null ? "–" : `${(1000 * value).toFixed(1)} ms`);
+  const metres = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)} m`), time = (value) => (value === null ? "–" : value < 1 ? `${(1000 * value).toFixed(1)} ms` : `${value.toFixed(2)} s`);
   const percent = answer.gap === null ? "–" : `${(100 * answer.gap).toFixed(1)} %`;
   $("title").textContent = answer.length === null ? `No path: ${answer.status}` : `Path of ${answer.length.toFixed(2)} m`;
   $("message").textContent = answer.length === null ? answer.message : "";
   const rows = [["no path is shorter than", metres(answer.lower_bound)], ["at most longer by", percent],
                 ["room to the walls", metres(answer.min_clearance)], ["first path", answer.first_length ? `${metres(answer.first_length)} after ${time(answer.time_to_first)}` : time(answer.time_to_first)],
                 ["samples, tree nodes", `${answer.samples}, ${answer.tree_nodes}`], ["planned in", time(answer.planning_time)]];
-  $("figures").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
+  $("figures").replaceChildren(...(answer.length === null ? [] : rows).flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
 }
 
 function element(kind, text) {
@@ -155,7 +160,7 @@ setInterval(() => {
   times = times.filter((time) => now - time < 1000);
   const sorted = counts.latencies.slice(-1000).sort((a, b) => a - b);
   const late = sorted.length ? `; from mouse to picture ${sorted[Math.floor(0.99 * (sorted.length - 1))].toFixed(0)} ms in 99 of 100` : "";
-  $("pace").textContent = `${times.length} answers in the last second${late}`;
+  $("pace").textContent = `${times.length} answer${times.length === 1 ? "" : "s"} in the last second${late}`;
 }, 500);
 
 // Files and settings.

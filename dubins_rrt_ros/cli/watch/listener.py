@@ -56,6 +56,7 @@ class Listener:
         self._poses: np.ndarray = np.empty((0, 3))
         self._status: Mapping[str, str] = {}
         self._ends: dict[str, tuple[float, float, float]] = {}
+        self._waypoints: list[Point] = []
         self._message = "Waiting for the planner."
         self._location: Point | None = None
         self._context = rclpy.Context()
@@ -72,7 +73,7 @@ class Listener:
                 (MarkerArray, f"{name}/tree", self._take_tree, LATCHED),
                 (PoseStamped, "start_pose", lambda message: self._take_pose("start", message), VOLATILE),
                 (PoseWithCovarianceStamped, "initialpose", lambda message: self._take_pose("start", message), VOLATILE),
-                (PoseStamped, "goal_pose", lambda message: self._take_pose("goal", message), VOLATILE)):
+                (PoseStamped, "goal_pose", self._take_goal, VOLATILE), (PoseArray, "goal_poses", self._take_goals, VOLATILE)):
             self._node.create_subscription(kind, topic, take, qos)
         self._node.create_timer(PARAMETER_PERIOD, self._read_parameters)
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -145,9 +146,23 @@ class Listener:
         except ValueError:
             return  # which the planner tells in its status
 
+    def _take_goal(self, message: PoseStamped) -> None:
+        self._waypoints = []
+        self._take_pose("goal", message)
+
+    def _take_goals(self, message: PoseArray) -> None:
+        """Show waypoints, and the goal after them, whose heading stays as it was where any will do."""
+        if not message.poses:
+            return
+        *self._waypoints, (x, y) = [(pose.position.x, pose.position.y) for pose in message.poses]
+        try:
+            self._send_pose("goal", pose_from("goal", message.poses[-1]))
+        except ValueError:
+            self._send_pose("goal", (x, y, self._ends.get("goal", (x, y, 0.0))[2]))
+
     def _send_pose(self, name: str, pose: tuple[float, float, float]) -> None:
         self._ends[name] = pose
-        self._send({"type": "poses", **self._ends})
+        self._send({"type": "poses", **self._ends, "via": self._waypoints})
 
     def _read_parameters(self) -> None:
         if self._parameters.services_are_ready():
