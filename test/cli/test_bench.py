@@ -158,6 +158,12 @@ def test_rows_are_named_and_problems_chosen():
     assert [(line["problem"], line["planner"]) for line in lines] == [("hall", "plain"), ("third", "plain")]
 
 
+def test_the_map_of_a_problem_may_be_an_installed_one_by_its_name():
+    at = {"start": [1.5, 2.0, 1.57], "goal": [1.5, 6.0, 1.57]}
+    lines = bench(problems(entry(map="maze", **at), entry(name="b", map="maze.geojson", **at)), *BUDGET)
+    assert len(lines) == 2 and all(line["solved"] for line in lines)
+
+
 @pytest.mark.parametrize(("document", "says"), [
     ({"problems": []}, "no list of problems"), ([], "no list of problems"), ([7], "problem 1 is no object"),
     ([{"name": "a", "map": "hall.wkt"}], "problem 1 lacks start, goal, turning_radius, robot_radius"),

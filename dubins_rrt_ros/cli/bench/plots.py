@@ -24,7 +24,7 @@ LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 COLUMNS, WIDTH, HEIGHT, ROW = 3, 3.3, 2.4, 0.3
 #: Ranges of the axes: the earliest time [s], and cost / best known - 1, below which costs are drawn at LEAST.
 EARLIEST, LEAST, MOST = 1e-3, 1e-3, 2.0
-TIMES = {0.001: "1 ms", 0.01: "10 ms", 0.1: "0.1 s", 1: "1 s", 10: "10 s", 100: "100 s", 1000: "1000 s"}
+TIMES = {0.001: "1 ms", 0.01: "10 ms", 0.1: "100 ms", 1: "1 s", 10: "10 s", 100: "100 s", 1000: "1000 s"}
 COSTS = {LEAST: "≤ 0.1 %", 0.01: "1 %", 0.1: "10 %", 1: "100 %"}
 INSTANTS = 400
 
@@ -106,7 +106,7 @@ def _panels(problems: list[str], times: np.ndarray, planners: int) -> tuple[Figu
         axes.set_title(problem, fontsize=12, weight="bold", loc="left")
         axes.tick_params(labelsize=10, which="both", labelbottom=True)
         axes.grid(color="#dddddd", linewidth=0.6)
-    figure.supxlabel("time since the request [s]", fontsize=12)
+    figure.supxlabel("time since the request", fontsize=12)
     figure.supylabel("cost above the best known", fontsize=12)
     return figure, panels
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Problem, Settings, Vehicle, checked_pose, options
 from dubins_rrt_ros.planning.maps.frame import doubt_about_yaw
-from dubins_rrt_ros.planning.maps.locate import no_folder
+from dubins_rrt_ros.planning.maps.locate import installed_map, no_folder
 from dubins_rrt_ros.planning.text import one_line, quoted
 from dubins_rrt_ros.planning.vehicle import overridden
 
@@ -110,10 +110,12 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
     if not entry["name"].isprintable() or len(entry["name"]) > LONGEST_NAME:
         raise UsageError(f"{where}: its name is {quoted(entry['name'])}; give one of {LONGEST_NAME} printable characters at most")
     where, map_file = f"{where}, {entry['name']}", folder / entry["map"]
+    if not os.path.exists(map_file):
+        map_file = installed_map(entry["map"]) or map_file
     if not os.path.isfile(map_file):  # pathlib's is_file() raises for a name that is too long
         what = no_folder(map_file)
         raise UsageError(one_line(f"{where}: its map {map_file} {what}" if what else f"{where}: there is no map file {map_file}; "
-                                  "its name is relative to the file of problems"))
+                                  "its name is relative to the file of problems, or that of an installed map, such as maze"))
     _check_keys(entry, where)
     try:
         vehicle = Vehicle(**dict(_given(Vehicle, entry)))

@@ -67,6 +67,11 @@ def find_own(path: str | os.PathLike[str]) -> Path:
     return next(filter(os.path.isfile, _places(path)), expand_home(path))
 
 
+def installed_map(name: str) -> Path | None:
+    """Return the file of one of the package's own maps, by its name with or without the ending; None where there is none."""
+    return next(filter(os.path.isfile, _places(name)[1:]), None)
+
+
 def no_folder(path: Path) -> str:
     """Return what is wrong with a folder that is named as a map; "" where it is none."""
     return f"is a directory; give the map file in it ({', '.join(MAP_ENDINGS)})" if os.path.isdir(path) else ""
