@@ -377,7 +377,8 @@ class _Call:
         if not self._settings.informed and found.samples >= found.settings.samples:
             return f"No path found within {found.samples} samples, the leg's share", "samples"
         limit = f"planning_time {self._settings.planning_time:g} s"
-        return f"No path within {limit}, and waypoints take more of it than a goal alone", "time"
+        most = ", those without a heading most" if any(theta is None for _, _, theta in self._waypoints) else ""
+        return f"No path within {limit}, and waypoints take more of it than a goal alone{most}", "time"
 
     def _has_all_headings(self, leg: Problem) -> bool:
         """Return True if a leg was planned with all headings that its ends may have."""

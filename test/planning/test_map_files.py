@@ -138,8 +138,14 @@ def test_what_is_transparent_has_no_colour(tmp_path):
 
 def test_of_many_colours_the_most_frequent_are_told(tmp_path):
     path = write_grid(tmp_path, name="m.png")
-    picture(tmp_path, *((n, 255, 0) for n in range(60)), *[BLUE] * 3)
+    picture(tmp_path, *((40 * (n % 6), 255, 60 * (n // 6)) for n in range(20)), *[BLUE] * 3)
     assert load_map(path).warnings[0].count("became") == 6 and "(0, 0, 255) became" in load_map(path).warnings[0]
+
+
+def test_shades_of_a_smooth_edge_are_told_as_one_colour(tmp_path):
+    path = write_grid(tmp_path, name="m.png")
+    picture(tmp_path, *((200 + n, 30 + n, 30 - n) for n in range(20)), *[BLUE] * 3)
+    assert load_map(path).warnings[0].count("became") == 2
 
 
 def test_a_picture_is_a_map_where_its_resolution_is_given(tmp_path):

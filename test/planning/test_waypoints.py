@@ -216,6 +216,13 @@ def test_a_start_that_no_arc_leaves_is_a_proof_whatever_headings_follow(first):
     assert "On the way to waypoint 1 at (3.000, 3.000): No path exists: every forward arc from the start" in answer.message
 
 
+@pytest.mark.parametrize(("heading", "words"), [((0.0,), "than a goal alone; "), ((), ", those without a heading most; ")])
+def test_without_time_it_is_told_what_takes_most_of_it(heading, words):
+    maze = Problem(load_map("maze"), DISC, (1.5, 2.0, math.pi / 2), (13.5, 2.0, -math.pi / 2))
+    answer = plan_through(maze, [(7.5, 10.5, *heading)], replace(SETTINGS, planning_time=1e-3))
+    assert answer.status == Status.TIMEOUT and words in answer.message
+
+
 @pytest.mark.parametrize("heading", [(math.pi,), ()], ids=["a heading", "any heading"])
 def test_a_leg_without_a_path_tells_why_where_that_holds_of_all_headings(heading):
     cells = np.full((60, 200), 100, np.int8)

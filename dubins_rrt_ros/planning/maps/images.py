@@ -5,6 +5,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import islice
 from types import MappingProxyType
 from typing import BinaryIO, NamedTuple
 
@@ -22,8 +23,10 @@ PNG_SLACK = 2**20
 
 #: Largest difference between red, green and blue of a shade of grey.
 GREY_CHROMA = 16
-#: Maximum number of colours that are listed, and of pixels that are looked at for them.
-MAX_COLOURS, MAX_COLOURED_PIXELS = 6, 1_000_000
+#: Maximum number of colours that are listed, and of pixels and of frequent colours that are looked at for them.
+MAX_COLOURS, MAX_COLOURED_PIXELS, MAX_FREQUENT = 6, 1_000_000, 1000
+#: Largest difference between red, green and blue of colours that are listed as one: a smooth edge has many.
+SAME_COLOUR = 32
 
 _GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
 _PGM_HEADER = re.compile(rb"P([25])" + 3 * (_GAP + rb"+(\d{1,9})") + _GAP)
@@ -254,5 +257,8 @@ def _colours(image: Image.Image, grey: np.ndarray, transparent: np.ndarray | Non
     at = at[::1 + len(at) // MAX_COLOURED_PIXELS]
     colours = np.stack([band.ravel()[at] for band in (red, green, blue, grey)], axis=1)
     found, count = np.unique(colours, axis=0, return_counts=True)
-    most = found[np.argsort(-count, kind="stable")[:MAX_COLOURS]].tolist()
-    return {(r, g, b): brightness for r, g, b, brightness in most}
+    listed: dict[tuple[int, int, int], int] = {}
+    for r, g, b, brightness in found[np.argsort(-count, kind="stable")[:MAX_FREQUENT]].tolist():
+        if all(max(abs(r - x), abs(g - y), abs(b - z)) > SAME_COLOUR for x, y, z in listed):
+            listed[r, g, b] = brightness
+    return dict(islice(listed.items(), MAX_COLOURS))
