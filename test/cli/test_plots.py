@@ -28,9 +28,11 @@ class Picture:
         side = np.ptp(corners, axis=0).max()
         self.low = corners.min(axis=0) - 0.01 * side
         self.scale = plots.MAP_SIDE * plots.DPI / (1.02 * side)
+        below = plots.BOTTOM + plots.ROW * math.ceil(len(plots.legend_entries(drawn)) / plots.COLUMNS)
+        self.corner = np.array([plots.LEFT, below]) * plots.DPI
 
     def at(self, x, y):
-        column, up = np.array([plots.LEFT, plots.BOTTOM]) * plots.DPI + self.scale * (np.array([x, y]) - self.low)
+        column, up = self.corner + self.scale * (np.array([x, y]) - self.low)
         return "#{:02x}{:02x}{:02x}".format(*self.pixels[len(self.pixels) - 1 - int(up), int(column)])
 
     def places(self, colour):
@@ -38,7 +40,8 @@ class Picture:
         rgb = [int(colour[i:i + 2], 16) for i in (1, 3, 5)]
         rows, columns = np.nonzero((np.abs(self.pixels - rgb) <= 2).all(axis=2))
         pixels = np.stack([columns, len(self.pixels) - 1 - rows], axis=1) + 0.5
-        return self.low + (pixels - np.array([plots.LEFT, plots.BOTTOM]) * plots.DPI) / self.scale
+        on_map = pixels[:, 1] > self.corner[1] - 2  # and not in the legend below
+        return self.low + (pixels[on_map] - self.corner) / self.scale
 
 
 @pytest.fixture

@@ -72,7 +72,7 @@ def test_a_plan_without_a_path_shows_the_cause():
 def test_a_path_with_a_preferred_clearance_is_coloured_by_its_room():
     result = plan(problem_here(), Settings(samples=20, planning_time=60.0, seed=1, preferred_clearance=5.0))
     axes = result.plot()
-    assert {"path without room", "with the preferred clearance"} <= set(legend(axes))
+    assert {"path without room", "path with preferred room"} <= set(legend(axes))
     by_room = next(lines for lines in axes.collections if lines.get_array() is not None)
     rooms = result.rooms()
     np.testing.assert_allclose(by_room.get_array(), (rooms[:-1] + rooms[1:]) / 2)
@@ -133,11 +133,11 @@ def test_a_gif_shows_every_frame_and_ends_with_the_answer(tmp_path):
     assert (np.abs(last.astype(int) - orange) < 12).all(axis=2).sum() > 300
 
 
-def test_the_bound_of_an_animation_never_falls():
+def test_the_bound_of_an_animation_never_falls_and_is_at_last_the_answers():
     recording, result, _ = recorded(every=20)
-    recording._add(replace(result, lower_bound=0.0))  # the proof of the recorded search went further
+    recording._add(replace(result, lower_bound=1.0))  # the proof of the recorded search went further
     bounds = [frame.lower_bound for frame in _SearchScreen(recording._frames)._frames]
-    assert bounds == sorted(bounds) and bounds[-1] > 0
+    assert bounds == sorted(bounds) and bounds[-1] == 1.0
 
 
 def test_a_page_holds_its_frames_and_needs_no_network(tmp_path):

@@ -150,7 +150,6 @@ class _Screen:
         self._figure = Figure(figsize=(across, up), dpi=DPI)
         self._map = self._figure.add_axes((LEFT / across, below / up, width / across, height / up))
         frame(self._map, world_map)
-        self._map.set(xlabel="")
         draw_map(self._map, world_map)
         self._curves = self._figure.add_axes((LEFT / across, BOTTOM / up, width / across, CURVES / up))
         self._curves.spines[["top", "right"]].set_visible(False)
@@ -188,8 +187,8 @@ class _SearchScreen(_Screen):
 
     def __init__(self, frames: Sequence[Frame]):
         super().__init__(frames[-1].drawing.map)
-        # A search that is recorded takes longer, and the proof beside it may get further than that of the answer.
-        bounds = accumulate((one.lower_bound for one in frames), max)
+        # A search that is recorded takes longer, and the proof beside it may get further than that of the answer, which is told.
+        bounds = accumulate((min(one.lower_bound, frames[-1].lower_bound) for one in frames), max)
         self._frames = [one._replace(lower_bound=bound) for one, bound in zip(frames, bounds, strict=True)]
         values = (value for one in self._frames for value in (one.length, one.lower_bound))
         known = [value for value in values if value is not None and np.isfinite(value)]
@@ -224,7 +223,8 @@ class _DriveScreen(_Screen):
         super().__init__(plan.problem.map)
         self._drawing, self._clearances, self._indices = of_plan(plan), plan.clearances(), plan.waypoint_indices
         chords = np.hypot(*np.diff(self._drawing.path[:, :2], axis=0).T)
-        self.driven = np.append(0.0, np.cumsum(chords))
+        driven = np.append(0.0, np.cumsum(chords))
+        self.driven = driven * ((plan.length or 0.0) / (driven[-1] or 1.0))  # of arcs, which are longer than their chords
         self._curves.set(xlim=(0, self.driven[-1] or 1.0), ylim=(0, 1.15 * self._clearances.max() or 1.0), xlabel="driven [m]",
                          ylabel="clearance [m]")
         self._lines = [self._curves.plot([], [], color=PATH, linewidth=2)[0]]

@@ -3,14 +3,16 @@
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch, Polygon
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path as Contour
 from matplotlib.transforms import Affine2D
 
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 #: The strong colours are of Okabe and Ito's palette, which all kinds of colour vision tell apart.
 FREE, UNKNOWN, OBSTACLE = "#ffffff", "#c4c8ce", "#454b54"
 TREE, PATH, START, GOAL, FAILURE = "#a9c8e4", "#d55e00", "#009e73", "#0072b2", "#e69f00"
-#: Colours of a path by its room: none, and as much as preferred.
-TIGHT, ROOMY = PATH, "#56b4e9"
+#: Colours of a path by its room: none, and as much as preferred, which is darker than the tree.
+TIGHT, ROOMY = PATH, GOAL
 ROOM_COLOURS = LinearSegmentedColormap.from_list("room", [TIGHT, ROOMY])
 DPI = 160
 #: Longer side of the map in the picture, margins for the labels around it, and minimum width, for the title [inch].
@@ -38,6 +40,8 @@ WAYPOINT, POINTER = "#8a4f7d", 20.0
 SWEPT = 0.18
 #: Height of a line below the title [inch], and number of its letters to the inch.
 LINE, LETTERS = 0.19, 13.5
+#: Columns of the legend below the map, and height of a row [inch].
+COLUMNS, ROW = 3, 0.2
 
 
 class Drawing(NamedTuple):
@@ -78,9 +82,15 @@ def of_plan(plan: "Plan") -> Drawing:
     """Return what the picture of a plan holds."""
     problem, size = plan.problem, np.ptp(plan.problem.map.corners(), axis=0).max()
     title, subtitle = _captions(plan)
-    return Drawing(problem.map, problem.start, problem.goal, problem.vehicle,
+    return Drawing(problem.map, problem.start, _reached(plan), problem.vehicle,
                    plan.tree.segments(size / 400), plan.poses(), title, subtitle, plan.location,
                    plan.rooms(), _passed(plan))
+
+
+def _reached(plan: "Plan") -> Sequence[float]:
+    """Return the goal, with the heading in which a path reaches it where any will do."""
+    goal = plan.problem.goal
+    return goal if plan.path is None or not plan.problem.any_goal_heading else (*goal[:2], plan.path.end[2])
 
 
 def _passed(plan: "Plan") -> list[Waypoint]:
@@ -96,7 +106,16 @@ def _captions(plan: "Plan") -> tuple[str, str]:
     if plan.length is None or plan.gap is None or plan.time_to_first is None:
         return f"{name}: no path, {plan.status.name}", plan.message
     return (path_title(plan.settings.planner, plan.length, plan.gap, len(plan.waypoints)),
-            figures_title(plan.samples, plan.time_to_first, plan.planning_time))
+            f"{_cost_title(plan)}{figures_title(plan.samples, plan.time_to_first, plan.planning_time)}")
+
+
+def _cost_title(plan: "Plan") -> str:
+    """Return the figures of the cost, where they are not those of the length, which the title has."""
+    if plan.cost is None or plan.cost_gap is None or plan.length is None or plan.gap is None:
+        return ""
+    of_cost, of_length = (f"{value:.2f} m, {_above(gap, 'the least possible')}; "
+                          for value, gap in ((plan.cost, plan.cost_gap), (plan.length, plan.gap)))
+    return f"cost {of_cost}" if of_cost != of_length else ""
 
 
 def planner_title(planner: str) -> str:
@@ -109,7 +128,11 @@ def path_title(planner: str, length: float, gap: float, waypoints: int = 0) -> s
     if waypoints:  # in no more letters, for which there is room
         return (f"{planner_title(planner)}: {length:.2f} m over {waypoints} waypoint{'' if waypoints == 1 else 's'}, "
                 f"gap at most {100 * gap:.1f} %")
-    return f"{planner_title(planner)}: {length:.2f} m, at most {100 * gap:.1f} % above the shortest"
+    return f"{planner_title(planner)}: {length:.2f} m, {_above(gap, 'the shortest')}"
+
+
+def _above(gap: float, least: str) -> str:
+    return f"at most {100 * gap:.1f} % above {least}"
 
 
 def figures_title(samples: int, time_to_first: float, planning_time: float) -> str:
@@ -118,7 +141,7 @@ def figures_title(samples: int, time_to_first: float, planning_time: float) -> s
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds:.2f} s" if seconds >= 1 else f"{1000 * seconds:.3g} ms"
+    return f"{seconds:.2f}\xa0s" if seconds >= 1 else f"{1000 * seconds:.3g}\xa0ms"  # on one line
 
 
 def draw(file: str, drawing: Drawing) -> None:
@@ -135,7 +158,41 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     draw_path(axes, drawing.vehicle, drawing.path, drawing.rooms)
     draw_poses(axes, drawing)
     if drawing.location is not None:
-        axes.plot(*drawing.location, "x", color=FAILURE, markersize=12, markeredgewidth=3, zorder=6)
+        axes.add_line(_failure_mark(*drawing.location, zorder=8))
+
+
+def _failure_mark(x: float | None = None, y: float | None = None, **style: Any) -> Line2D:
+    """Return a ring around what keeps a path from being there, which stays in sight; or that of a legend."""
+    place = ([], []) if x is None else ([x], [y])
+    return Line2D(*place, marker="o", linestyle="", color=FAILURE, markerfacecolor="none", markersize=13, markeredgewidth=3,
+                  **style)
+
+
+def legend_entries(drawing: Drawing, tree: str = "tree") -> list[Artist]:
+    """Return what explains the colours of a picture, and of its tree by a name."""
+    entries = map_entries(drawing.map)
+    if len(drawing.tree):
+        entries.append(tree_entry(tree))
+    if len(drawing.path):
+        kinds = [(PATH, "path")] if drawing.rooms is None else [(TIGHT, "path without room"), (ROOMY, "path with preferred room")]
+        entries += [Line2D([], [], color=colour, linewidth=2.4, label=label) for colour, label in kinds]
+        entries.append(Patch(color=PATH, alpha=SWEPT, label="swept by the vehicle"))
+    if drawing.location is not None:
+        entries.append(_failure_mark(label="why there is no path"))
+    return entries
+
+
+def map_entries(world_map: Map) -> list[Artist]:
+    """Return what explains the colours of a map."""
+    has_unknown = isinstance(world_map, GridMap) and bool(
+        (world_map.blocked(allow_unknown=False) != world_map.blocked(allow_unknown=True)).any())
+    kinds = [(FREE, "free"), (OBSTACLE, "obstacle"), *([(UNKNOWN, "unknown")] if has_unknown else [])]
+    return [Patch(facecolor=colour, edgecolor=OBSTACLE, linewidth=0.6, label=label) for colour, label in kinds]
+
+
+def tree_entry(name: str) -> Artist:
+    """Return what explains the colour of a tree."""
+    return Line2D([], [], color=TREE, label=name)
 
 
 def frame(axes: Axes, world_map: Map) -> None:
@@ -196,9 +253,13 @@ def _canvas(drawing: Drawing) -> tuple[Figure, Axes]:
     width, height = MAP_SIDE * (high - low) / (high - low).max()
     across = max(width + LEFT + RIGHT, WIDTH)
     lines = textwrap.wrap(drawing.subtitle, int(LETTERS * (across - LEFT)))
-    up = height + BOTTOM + TOP + LINE * len(lines)
+    entries = legend_entries(drawing)
+    below = BOTTOM + ROW * math.ceil(len(entries) / COLUMNS)
+    up = height + below + TOP + LINE * len(lines)
     figure = Figure(figsize=(across, up))
-    axes = figure.add_axes((LEFT / across, BOTTOM / up, width / across, height / up))
+    axes = figure.add_axes((LEFT / across, below / up, width / across, height / up))
+    figure.legend(handles=entries, loc="lower left", bbox_to_anchor=(LEFT / across, 0), ncols=COLUMNS, fontsize=9, frameon=False,
+                  borderaxespad=0.2, borderpad=0.2)
     frame(axes, drawing.map)
     axes.tick_params(labelsize=9)
     figure.text(LEFT / across, 1 - 0.16 / up, drawing.title, fontsize=13, weight="bold", va="top")

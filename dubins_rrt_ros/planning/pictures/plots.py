@@ -8,13 +8,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.transforms import ScaledTranslation
 
-from ..maps.model import GridMap, Map
+from ..maps.model import Map
+from ..text import quoted
 from . import drawing
-from .drawing import FAILURE, FREE, OBSTACLE, PATH, ROOMY, SWEPT, TIGHT, TREE, UNKNOWN
 
 if TYPE_CHECKING:
     from ..result import Plan
@@ -30,40 +28,34 @@ BELOW = 0.4
 
 def plot_map(world_map: Map, ax: Axes | None = None) -> Axes:
     """Draw free, occupied and unknown space."""
-    axes = ax or _new_axes()
+    axes = _checked(ax)
     drawing.frame(axes, world_map)
     drawing.draw_map(axes, world_map)
-    _add_legend(axes, _map_handles(world_map))
+    _add_legend(axes, drawing.map_entries(world_map))
     return axes
 
 
 def plot_tree(tree: "Tree", ax: Axes | None = None) -> Axes:
     """Draw all edges; axes that show something already keep their limits."""
-    axes = ax or _new_axes()
+    axes = _checked(ax)
     is_alone = not axes.has_data()
     drawing.draw_tree(axes, tree.segments(2 * np.pi * tree.radius / PIECES))
     if is_alone:
         axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
         axes.margins(0.05)
         axes.autoscale_view()
-        _add_legend(axes, _tree_handles(tree))
+        _add_legend(axes, [drawing.tree_entry(_tree_name(tree))])
     return axes
 
 
 def plot_plan(plan: "Plan", ax: Axes | None = None) -> Axes:
     """Draw the map, the tree, the path with what the vehicle sweeps, start and goal, and the cause where there is no path."""
-    axes, problem = ax or _new_axes(), plan.problem
-    drawing.frame(axes, problem.map)
+    axes = _checked(ax)
+    drawing.frame(axes, plan.problem.map)
     contents = drawing.of_plan(plan)
     drawing.draw_on(axes, contents)
     axes.set_title(contents.title, fontsize=11)
-    handles = [*_map_handles(problem.map), *(_tree_handles(plan.tree) if len(plan.tree) > 1 else ())]
-    if plan.path is not None:
-        handles += [*_path_handles(contents.rooms is not None),
-                    Patch(color=PATH, alpha=SWEPT, label="swept by the vehicle")]
-    if plan.location is not None:
-        handles.append(Line2D([], [], color=FAILURE, marker="x", linestyle="", markeredgewidth=3, label="why there is no path"))
-    _add_legend(axes, handles)
+    _add_legend(axes, drawing.legend_entries(contents, _tree_name(plan.tree)))
     return axes
 
 
@@ -76,27 +68,24 @@ def png_of(plot: Callable[[Axes], Axes]) -> bytes:
     return picture.getvalue()
 
 
+def _checked(ax: Axes | None) -> Axes:
+    """Return the axes that were given, or new ones."""
+    if ax is None:
+        return _new_axes()
+    if not isinstance(ax, Axes):
+        raise TypeError(f"plot() draws on axes of matplotlib, not on {quoted(ax)}; plot().figure.savefig(FILE) writes a picture")
+    return ax
+
+
+def _tree_name(tree: "Tree") -> str:
+    return f"tree of {len(tree)} nodes"
+
+
 def _new_axes() -> Axes:
     """Return the axes of a new figure that pyplot shows."""
     from matplotlib import pyplot  # here, for it picks a window system, which a picture in a file needs not
     _, axes = pyplot.subplots(figsize=(SIDE, SIDE), layout="constrained")
     return axes
-
-
-def _map_handles(world_map: Map) -> list[Artist]:
-    has_unknown = isinstance(world_map, GridMap) and bool(
-        (world_map.blocked(allow_unknown=False) != world_map.blocked(allow_unknown=True)).any())
-    kinds = [(FREE, "free"), (OBSTACLE, "obstacle"), *([(UNKNOWN, "unknown")] if has_unknown else [])]
-    return [Patch(facecolor=colour, edgecolor=OBSTACLE, linewidth=0.6, label=label) for colour, label in kinds]
-
-
-def _tree_handles(tree: "Tree") -> list[Artist]:
-    return [Line2D([], [], color=TREE, label=f"tree of {len(tree)} nodes")]
-
-
-def _path_handles(is_by_room: bool) -> list[Artist]:
-    kinds = [(TIGHT, "path without room"), (ROOMY, "with the preferred clearance")] if is_by_room else [(PATH, "path")]
-    return [Line2D([], [], color=colour, linewidth=2.4, label=label) for colour, label in kinds]
 
 
 def _add_legend(axes: Axes, handles: list[Artist]) -> None:

@@ -49,6 +49,9 @@ class Tree(Plottable):
     lengths: np.ndarray
     edge_costs: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"Tree({len(self)} node{'' if len(self) == 1 else 's'}, radius={self.radius:g})"
+
     @classmethod
     def copy_of(cls, tree: SearchTree) -> "Tree":
         """Copy the tree of a search under way."""
