@@ -27,5 +27,5 @@ def add_arguments(parser: Parser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Plan, prove, write the file, and return the exit status."""
-    return plan.run(argparse.Namespace(json=None, csv=None, plot=None, replay=None, certificate=arguments.out,
-                                       **SHORTEST | vars(arguments)))
+    return plan.run(argparse.Namespace(json=None, csv=None, plot=None, drive=None, replay=None,
+                                       certificate=arguments.out, **SHORTEST | vars(arguments)))

@@ -63,6 +63,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--csv", metavar="FILE", help="write the poses of the path as CSV: x, y, theta, clearance, curvature")
     parser.add_argument("--plot", metavar="FILE", help=f"draw map, tree and path ({', '.join(DRAWINGS)}), or an animation of the "
                                                          f"search, over waypoints of the drive ({', '.join(ANIMATIONS)})")
+    parser.add_argument("--drive", metavar="FILE",
+                        help=f"draw an animation of the vehicle that drives along the path ({', '.join(ANIMATIONS)})")
     parser.add_argument("--certificate", metavar="FILE",
                         help="write the path with a proof of how short it is, as `dubins_rrt certify` does")
     add_certificate_flags(parser)
@@ -96,8 +98,9 @@ def add_request_arguments(parser: Parser, certified: bool = False) -> list[argpa
 def run(arguments: argparse.Namespace) -> int:
     """Plan, report, write the files, and return the exit status."""
     sources = [file for file in (getattr(arguments, "map", None), arguments.replay) if file]
-    check_folder(arguments.json, arguments.csv, arguments.plot, arguments.certificate, sources=sources)
+    check_folder(arguments.json, arguments.csv, arguments.plot, arguments.drive, arguments.certificate, sources=sources)
     check_drawing(arguments.plot, DRAWINGS + ANIMATIONS)
+    check_drawing(arguments.drive, ANIMATIONS)
     request = _request(arguments)
     if arguments.certificate and request.waypoints:
         raise UsageError("a path through waypoints has no certificate; leave --via out")
@@ -112,6 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
     _write(answer, request.map_name, arguments)
     if arguments.plot:
         _draw(arguments.plot, answer)
+    if arguments.drive and answer.path:
+        _draw_drive(arguments.drive, answer)
     if checked_map and answer.path:
         claim = write_proof(arguments.certificate, answer, checked_map, arguments.gap, arguments.seconds)
         print(claim, file=words_for(arguments.json))
@@ -121,7 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _request(arguments: argparse.Namespace) -> LoadedRequest:
     if arguments.replay is None:
         return new_request(arguments)
-    written = {"json", "csv", "plot", "certificate", "gap", "seconds"}
+    written = {"json", "csv", "plot", "drive", "certificate", "gap", "seconds"}
     others = vars(arguments).keys() - {"command", "run", "replay", *written, *MAP_FLAGS}
     if others:
         raise UsageError(f"--replay takes the whole request from its file; leave out {', '.join(sorted(others))}")
@@ -194,14 +199,19 @@ def _draw(file: str, answer: Plan) -> None:
         from dubins_rrt_ros.planning.pictures.drawing import draw_plan  # here, since matplotlib takes longer than most plans
         draw_plan(file, answer)
         return
-    from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, save_drive
     if answer.path and answer.waypoints:  # whose search is one of many legs in many headings
-        with progress_bar(MOST_FRAMES, " frames") as move:
-            save_drive(file, answer, lambda done: move(done, ""))
+        _draw_drive(file, answer)
         return
     recording = _recorded(answer)
     with progress_bar(recording.frames, " frames") as move:
         recording.save(file, answer, lambda done: move(done, ""))
+
+
+def _draw_drive(file: str, answer: Plan) -> None:
+    """Draw the vehicle on its path."""
+    from dubins_rrt_ros.planning.pictures.animation import MOST_FRAMES, save_drive
+    with progress_bar(MOST_FRAMES, " frames") as move:
+        save_drive(file, answer, lambda done: move(done, ""))
 
 
 def _recorded(answer: Plan) -> "Recording":
@@ -248,6 +258,7 @@ def _derived_figures(vehicle: Vehicle) -> str:
 def _more_figures(answer: Plan) -> str:
     """Return the figures that the message of a path leaves out: it has length, gap, samples and planning time."""
     grid = answer.problem.map
-    return (f"Lower bound {answer.lower_bound:.2f} m, first path after {answer.time_to_first:.3g} s, "
+    gap = f", gap {100 * answer.gap:.1f} %" if answer.gap is not None and math.isfinite(answer.gap) else ""
+    return (f"Lower bound of the length {answer.lower_bound:.2f} m{gap}, first path after {answer.time_to_first:.3g} s, "
             f"{len(answer.tree)} tree nodes, least clearance {answer.min_clearance:.3g} m, "
             f"seed {answer.settings.seed}." + (f" Cells: {grid.describe_cells()}." if isinstance(grid, GridMap) else ""))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 
 from dubins_rrt_ros.cli.main import main
 from dubins_rrt_ros.planning import ClearanceField, PolygonMap, Settings, rasterise, save_map
@@ -49,7 +50,7 @@ def refusal(*argv, capsys):
 def test_a_path_is_told_in_one_line_with_its_figures(hall, capsys):
     status, out, error = run(hall, *REQUEST, *BUDGET, capsys=capsys)
     assert status == 0 and error == "" and out.count("\n") == 1
-    for figure in (" m, ", "%", "150 samples", "Lower bound ", "first path after ", "tree nodes", "seed 4"):
+    for figure in (" m, ", "%", "150 samples", "Lower bound of the length ", "first path after ", "tree nodes", "seed 4"):
         assert figure in out
 
 
@@ -63,6 +64,25 @@ def test_a_yaw_beyond_a_full_turn_is_doubted_and_degrees_can_be_given(hall, caps
     assert status == 0 and "warning" not in error
     assert [json.loads(out)[name][2] for name in ("start", "goal")] == [math.pi / 2, -math.pi / 2]
     assert run(hall, *REQUEST, *BUDGET, capsys=capsys)[2] == ""
+
+
+def test_the_gap_of_the_length_is_told_beside_that_of_the_cost(hall, capsys):
+    _, out, error = run(hall, *REQUEST, *BUDGET, "--json", "-", capsys=capsys)
+    answer = json.loads(out)
+    assert f"at most {100 * answer['cost_gap']:.1f} % above the least possible" in error
+    assert f"Lower bound of the length {answer['lower_bound']:.2f} m, gap {100 * answer['gap']:.1f} %, " in error
+
+
+def test_a_pose_with_commas_is_told_how_it_is_written(hall, capsys):
+    for numbers in (["1,2,1.57"], ["-4", "-3"]):
+        error = refusal(hall, "--start", *numbers, "--goal", "3.5", "-3", "0", capsys=capsys)
+        assert "argument --start: give X Y YAW, with blanks between them" in error
+
+
+def test_the_drive_along_a_path_is_an_animation(hall, capsys):
+    assert run(hall, *REQUEST, *BUDGET, "--drive", "drive.gif", capsys=capsys)[0] == 0
+    assert Image.open("drive.gif").n_frames > 50
+    assert "drive.png" in refusal(hall, *REQUEST, "--drive", "drive.png", capsys=capsys)
 
 
 def test_the_reference_point_of_a_car_is_told_in_help_readme_and_docs(capsys):

@@ -54,6 +54,14 @@ class Parser(argparse.ArgumentParser):
             self.error(f"{extras[0].strip()} is one argument too many")
         return parsed, extras
 
+    def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:
+        try:
+            return super()._match_argument(action, arg_strings_pattern)
+        except argparse.ArgumentError:
+            if isinstance(action.metavar, tuple):  # several numbers, which some write with commas
+                raise argparse.ArgumentError(action, f"give {' '.join(action.metavar)}, with blanks between them") from None
+            raise
+
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             remedy = near_miss(value, action.choices) or f"; give one of {', '.join(action.choices)}"
