@@ -11,12 +11,12 @@ from support import naive
 from support.cases import SCALE, boxes_grid, holed_polygons, naive_clearance, scaled
 from support.naive import are_connected, free_space
 
-from dubins_rrt_ros.planning import ClearanceField, Problem, Status, Vehicle
+from dubins_rrt_ros.planning import ClearanceField, PolygonMap, Problem, Status, Vehicle
 from dubins_rrt_ros.planning._kernels.widest_path import WidestPathSearch
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.diagnosis.components import are_separated
 from dubins_rrt_ros.planning.diagnosis.explain import before_search
-from dubins_rrt_ros.planning.diagnosis.widest_passage import sample_spacing, widest_passage
+from dubins_rrt_ros.planning.diagnosis.widest_passage import AT_ONCE, sample_spacing, widest_passage
 
 
 @pytest.mark.parametrize("seed", range(scaled(30, least=6)))
@@ -127,3 +127,21 @@ def check_claimed_radius(problem, message):
         assert are_connected(replace(problem, allow_unknown=True), problem.vehicle.robot_radius)
     if "no robot_radius" in message:
         assert not are_connected(problem, 1e-4)
+
+
+def test_the_time_is_looked_at_before_the_clearance_at_many_points_is_measured():
+    """Where a map has many edges that takes long; the passage here is found at some thousand points."""
+    class Field(ClearanceField):
+        most = 0
+
+        def at(self, points):
+            self.most = max(self.most, np.asarray(points).size // 2)
+            return super().at(points)
+
+    walls = [shapely.box(2 * i, 10 * (i % 2), 2 * i + 1, 30 + 10 * (i % 2)) for i in range(1, 20)]
+    world_map = PolygonMap(shapely.box(0, 0, 41, 40).difference(shapely.union_all(walls)))
+    looks, field = [], Field(world_map)
+    passage = widest_passage(Problem(world_map, Vehicle(1.0, 0.2), (1.0, 1.0, 1.0), (40.0, 1.0, -1.0)), field,
+                             lambda: looks.append(field.most))
+    assert passage.radius > 0.2 and len(looks) > 20
+    assert field.most <= AT_ONCE

@@ -73,7 +73,7 @@ def widest_passage(problem: Problem, field: ClearanceField, check_time: Callable
     left = math.hypot(*to_goal)
     end = points[-1] + to_goal * (max(0.0, left - problem.goal_tolerance_xy) / left if left > 0 else 0.0)
     found, centred = (_measured(np.vstack([problem.start[:2], way, end]), field, check_time)
-                      for way in (points, _centred(points, field, grid.spacing)))
+                      for way in (points, _centred(points, field, grid.spacing, check_time)))
     return centred if found.radius < min(centred.radius, problem.vehicle.required_clearance) else found
 
 
@@ -129,13 +129,13 @@ class _SampleGrid:
         return found
 
 
-def _centred(points: np.ndarray, field: ClearanceField, spacing: float) -> np.ndarray:
+def _centred(points: np.ndarray, field: ClearanceField, spacing: float, check_time: Callable[[], None]) -> np.ndarray:
     """Return points of a passage, each moved across it by up to `spacing` to where the clearance is greatest."""
     along = points[np.minimum(np.arange(len(points)) + 3, len(points) - 1)] - points[np.maximum(np.arange(len(points)) - 3, 0)]
     length = np.hypot(*along.T)
     across = np.column_stack([-along[:, 1], along[:, 0]]) / np.where(length > 0, length, 1.0)[:, None]
     places = points + spacing * np.linspace(-1, 1, PLACES)[:, None, None] * across
-    clearance = field.at(places)
+    clearance = _clearance(places, field, check_time)
     return np.asarray(places[np.argmax(clearance, axis=0), np.arange(len(points))])
 
 
@@ -144,12 +144,18 @@ def _measured(corners: np.ndarray, field: ClearanceField, check_time: Callable[[
     at_corners = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     arc_lengths = np.union1d(at_corners, np.linspace(0, at_corners[-1], MEASURED))
     points = np.column_stack([np.interp(arc_lengths, at_corners, corners[:, axis]) for axis in (0, 1)])
-    clearance = np.empty(len(points))
-    for first in range(0, len(points), AT_ONCE):
-        check_time()
-        clearance[first:first + AT_ONCE] = field.at(points[first:first + AT_ONCE])
+    clearance = _clearance(points, field, check_time)
     radius = float(((clearance[1:] + clearance[:-1] - np.diff(arc_lengths)) / 2).min())
-    return Passage(points, radius, *_narrowest(corners, field.at(corners)))
+    return Passage(points, radius, *_narrowest(corners, _clearance(corners, field, check_time)))
+
+
+def _clearance(points: np.ndarray, field: ClearanceField, check_time: Callable[[], None]) -> np.ndarray:
+    """Return the clearance at (..., 2) points [m], some of them at a time."""
+    flat, clearance = points.reshape(-1, 2), np.empty(points.shape[:-1])
+    for first in range(0, len(flat), AT_ONCE):
+        check_time()
+        clearance.reshape(-1)[first:first + AT_ONCE] = field.at(flat[first:first + AT_ONCE])
+    return clearance
 
 
 def _narrowest(corners: np.ndarray, clearance: np.ndarray) -> tuple[float, Point]:
