@@ -2,6 +2,7 @@
 
 import array
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,18 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Header
 
-from dubins_rrt_ros.planning import GridMap, InvalidPose, MapError, Plan, PolygonMap, Status, Thresholds, rasterise
+from dubins_rrt_ros.planning import (
+    OCCUPIED,
+    UNKNOWN,
+    GridMap,
+    InvalidPose,
+    MapError,
+    Plan,
+    PolygonMap,
+    Status,
+    Thresholds,
+    rasterise,
+)
 from dubins_rrt_ros.planning.maps.model import DEFAULT_THRESHOLDS
 from dubins_rrt_ros.planning.problem import Pose
 from dubins_rrt_ros.planning.text import one_line, quoted_name
@@ -181,7 +193,9 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds
     if len(message.data) != cells or cells == 0:
         raise MapError(f"{name} has {len(message.data)} values for {info.width} x {info.height} cells; "
                        "give width times height values, at least one")
-    rotation = info.origin.orientation
+    rotation, origin = info.origin.orientation, info.origin.position
+    if not math.isfinite(origin.z):
+        raise MapError(f"{name}: its origin is at x {origin.x}, y {origin.y}, z {origin.z}; give finite metres")
     yaw = _yaw(f"{name}: its origin", rotation, MapError)
     if (tilt := _tilt(rotation)) > MAP_TILT:
         raise MapError(f"{name}: its origin has {_written(rotation)}, which leans by {tilt:.3g} rad; turn it about z only "
@@ -189,8 +203,18 @@ def grid_from(message: OccupancyGrid, frame: str, max_map_cells: int, thresholds
     data = np.frombuffer(message.data, dtype=np.int8).reshape(info.height, info.width)
     # The field is a float32; the decimal it stands for gives the same map as the file that was published.
     resolution = float(str(np.float32(info.resolution)))
-    return GridMap(data, resolution, (info.origin.position.x, info.origin.position.y, yaw), name, percent=True,
-                   thresholds=thresholds)
+    return GridMap(data, resolution, (origin.x, origin.y, yaw), name, percent=True, thresholds=thresholds,
+                   warnings=tuple(_doubts_about_cells(data)))
+
+
+def _doubts_about_cells(data: np.ndarray) -> Iterator[str]:
+    """Yield what is doubtful about the cells of a message, which are percent whatever they hold."""
+    least, highest = int(data.min()), int(data.max())
+    if highest == 1:
+        yield "The map message holds no value above 1, which stands for 1 % and is free; publish 100 for an obstacle."
+    if least < UNKNOWN or highest > OCCUPIED:
+        yield (f"The map message holds values from {least} to {highest}; those above 100 are taken as occupied, those below -1 "
+               "as unknown; publish -1, or 0 to 100.")
 
 
 def updated_grid(grid: GridMap, message: Any, frame: str) -> GridMap:
@@ -217,7 +241,8 @@ def updated_grid(grid: GridMap, message: Any, frame: str) -> GridMap:
     cells = grid.data.copy()
     window = np.frombuffer(message.data, dtype=np.int8).reshape(message.height, message.width)
     cells[message.y:message.y + message.height, message.x:message.x + message.width] = window
-    return GridMap(cells, grid.resolution, grid.origin, grid.name, percent=True, thresholds=grid.thresholds)
+    return GridMap(cells, grid.resolution, grid.origin, grid.name, percent=True, thresholds=grid.thresholds,
+                   warnings=tuple(_doubts_about_cells(cells)))
 
 
 def is_same_grid(one: GridMap, other: GridMap) -> bool:

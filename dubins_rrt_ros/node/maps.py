@@ -141,18 +141,20 @@ class Maps:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings for a person about how the newest map's file was understood."""
+        """Warnings for a person about how the newest map was understood."""
         return self.map.warnings if self.map else ()
 
     def take(self, world_map: Map, grid: GridMap, by_topic: bool = False) -> None:
         """Plan on this map, which looks like this grid, from now on."""
+        told = self.warnings if by_topic and self._came_by_topic else ()  # of a stream of maps each is logged once
         self.map, self.grid, self.refusal = world_map, grid, ""
         self._came_by_topic = by_topic
         height, width = grid.data.shape
         shares = "" if by_topic else f", {grid.describe_cells()}"  # which takes too long for each map of a stream
         self._node.get_logger().info(f"Took a map of {width} x {height} cells: {one_line(world_map.name)}{shares}")
         for warning in self.warnings:
-            self._node.get_logger().warning(warning)
+            if warning not in told:
+                self._node.get_logger().warning(warning)
         self._newest_world()
         if self._publisher is not None:
             self._publisher.publish(self.message(grid))
@@ -160,9 +162,10 @@ class Maps:
 
     def refuse(self, error: MapError, log_again: bool = True) -> None:
         """Report why a map cannot be used; the one before stays. It is logged, `log_again` or not, where the reason is new."""
-        before, self.refusal = self.refusal, f" The last one was refused: {error}."
+        reason = str(error).removesuffix(".")
+        before, self.refusal = self.refusal, f" The last one was refused: {reason}."
         if log_again or self.refusal != before:
-            self._node.get_logger().error(f"A map was refused: {error}")
+            self._node.get_logger().error(f"A map was refused: {reason}")
         self._queue.post(self._on_news)
 
     def with_remark(self, outcome: Outcome) -> Outcome:

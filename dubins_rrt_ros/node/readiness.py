@@ -29,7 +29,7 @@ class Readiness:
         self.start: Pose | None = None
         self._start_refusal = ""  # why the last start was refused
         self._reported = ""  # what is missing, as it was logged last
-        self._seen_map: Map | None = None
+        self._map_warnings: tuple[str, tuple[str, ...]] = ("", ())  # of the map of that name that were told last
         self._map_refusal = ""  # why the last map was refused while there was one, as it was reported
 
     # What planning needs
@@ -109,16 +109,17 @@ class Readiness:
         return True
 
     def _report_map(self) -> None:
-        """Report once, as warnings, what is odd about the newest map's file, and that a map was refused while there is an older.
+        """Report once, as warnings, what is odd about the newest map, and that a map was refused while there is an older.
 
         When a newer one is taken after a refusal, that is reported too.
         """
         if self._maps.map is None:
             return
-        if self._maps.map is not self._seen_map and self._maps.warnings and self._outputs.status is not None:
+        warnings = self._maps.map.name, self._maps.warnings
+        if warnings != self._map_warnings and self._maps.warnings and self._outputs.status is not None:
             outcome = Outcome(Status.NONE, " ".join(self._maps.warnings), is_warning=True)
             self._outputs.report(outcome, log=False, map_id=self.map_id)
-        self._seen_map = self._maps.map
+        self._map_warnings = warnings
         before, self._map_refusal = self._map_refusal, self._maps.refusal
         if self._map_refusal and self._map_refusal != before:
             message = f"Planning goes on on an older map.{self._map_refusal}"

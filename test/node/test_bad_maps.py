@@ -104,7 +104,7 @@ def cells(count):
     ({"width": 2**16, "height": 2**16, "data": cells(0)}, ["65536 x 65536", "max_map_cells"]),
     *[({"resolution": value}, ["resolution", str(value)]) for value in (0.0, -0.1, NAN, INF, -INF)],
     ({"resolution": 1e-9}, ["1e-09 m", "cannot be planned on"]), ({"resolution": 3e38}, ["cannot be planned on"]),
-    *[({"origin": at(**{axis: value})}, ["origin", str(value)]) for axis in "xy" for value in (NAN, INF)],
+    *[({"origin": at(**{axis: value})}, ["origin", str(value)]) for axis in "xyz" for value in (NAN, INF)],
     ({"origin": at(x=1e300)}, ["cannot be planned on", "1e+300"]),
     ({"origin": turned()}, ["origin", "no rotation"]), ({"origin": turned(w=NAN)}, ["origin", "no rotation"]),
     ({"origin": turned(x=1.0)}, ["origin", "leans by 3.14 rad"]),
@@ -115,6 +115,7 @@ def test_a_map_that_is_none_is_refused_and_the_one_before_stays(talk, fields, wo
     talk.client.publish_map(changed(**fields))
     line = refusal(talk, said)
     assert [word for word in words if word not in line] == [], line
+    assert not line.endswith("..")
 
 
 @pytest.mark.parametrize("frame", ["map\n[ERROR] [1.0] [planner]: forged", "\x1b[2Jred", "x" * 1_000_000],
@@ -158,6 +159,19 @@ def test_cells_of_any_value_are_free_only_where_they_say_so(on_other_maps, value
     data[:, 60:] = value
     take(on_other_maps, changed(data=array.array("b", data.tobytes())))
     assert on_other_maps.plan(START, GOAL)[0]["error_name"] == name
+
+
+@pytest.mark.parametrize(("value", "words"), [
+    (1, "no value above 1, which stands for 1 % and is free"), (-2, "values from -2 to 4"), (127, "values from 0 to 127")])
+def test_cells_that_were_likely_meant_otherwise_are_told_once(on_other_maps, value, words):
+    client, said = on_other_maps.client, len(on_other_maps.process.output)
+    for column in (80, 90):
+        data = np.zeros((100, 100), np.int8)
+        data[:, column], data[0, 0] = value, min(value * value, 100)
+        take(on_other_maps, changed(data=array.array("b", data.tobytes())))
+    client.wait_for(lambda: any(status.level == DiagnosticStatus.WARN and words in status.message for status in client.statuses),
+                    "the warning as a status")
+    assert on_other_maps.process.output[said:].count(words) == 1
 
 
 def test_probabilities_are_free_and_occupied_by_thresholds_that_can_be_set(on_other_maps):
@@ -257,6 +271,7 @@ def assert_not_loaded(talk, url, result, words):
     assert response.result == result
     line = refusal(talk, said)
     assert [word for word in words if word not in line] == [], line
+    assert not line.endswith("..")
 
 
 @pytest.mark.parametrize(("name", "content", "result", "words"), [
