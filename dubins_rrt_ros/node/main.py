@@ -6,6 +6,7 @@ import sys
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
@@ -13,13 +14,16 @@ from dubins_rrt_ros.planning import MapError, OptionError
 from dubins_rrt_ros.planning.text import one_line
 
 from .interruption import Interruption
-from .parameter_files import as_yaml, unused_files
+from .parameter_files import as_yaml, doubtful_rules, unused_files
 from .parameter_table import as_table
 from .parameters import AS_TEXT, OPTIONS
 from .planner_node import PlannerNode
 
-#: What ROS says of a list of lists in a parameter file.
-NESTED_LIST = "Sequences cannot be key"
+#: What to do about what ROS says of its arguments, the first that fits.
+REMEDIES = {"Sequences cannot be key": f"; give a footprint {AS_TEXT}: footprint: \"[[x, y], ...]\"",
+            "params file": "; give a file of parameters as planner --print-parameters prints one",
+            "parameter override rule": "; give -p NAME:=VALUE, such as -p turning_radius:=2.0",
+            "-p flag": "; give -p NAME:=VALUE, such as -p turning_radius:=2.0"}
 #: Time after which a thread gives up Python's lock to another [s], in place of 5 ms: a path is published beside a search that
 #: goes on, and each call of ROS gives up the lock.
 SWITCH_INTERVAL = 2e-4
@@ -81,7 +85,8 @@ def _configured_node(arguments: list[str]) -> PlannerNode:
         raise ConfigurationError(f"map_file: {error}") from error
     except (OptionError, NameValidationException, ParameterException) as error:
         raise ConfigurationError(one_line(str(error))) from error
-    for warning in unused_files(arguments, node.get_fully_qualified_name()):
+    name = node.get_fully_qualified_name()
+    for warning in (*unused_files(arguments, name), *doubtful_rules(arguments, name)):
         node.get_logger().warning(warning)
     return node
 
@@ -106,6 +111,8 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _refused_by_ros(error: RuntimeError) -> ConfigurationError:
-    """Return what ROS says of its arguments, with the remedy where it met a list of lists."""
-    hint = f"; give a footprint {AS_TEXT}: footprint: \"[[x, y], ...]\"" if NESTED_LIST in str(error) else ""
+    """Return what ROS says of its arguments, with the remedy."""
+    if isinstance(error, rclpy_implementation.UnknownROSArgsError):
+        return ConfigurationError(one_line(f"ROS knows none of the arguments {error} after --ros-args; correct them"))
+    hint = next((hint for what, hint in REMEDIES.items() if what in str(error)), "")
     return ConfigurationError(one_line(str(error)) + hint)

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import yaml
 
 from dubins_rrt_ros.planning import options
-from dubins_rrt_ros.planning.maps.yaml import load_plain
+from dubins_rrt_ros.planning.maps.yaml import RepeatedKey, load_plain
 from dubins_rrt_ros.planning.text import one_line
 
 from .parameters import CLASSES, READ_ONLY, read_only
@@ -21,6 +22,10 @@ from .parameters import CLASSES, READ_ONLY, read_only
 WIDTH = 100
 #: Maximum size of a file that is read [bytes]; PyYAML may take three seconds for that.
 MAX_BYTES = 64 * 2**10
+#: The key of a node's parameters in a file.
+SECTION = "ros__parameters"
+#: What reading a file that ROS has taken may raise all the same.
+_UNREADABLE = (OSError, ValueError, RecursionError, OverflowError, yaml.YAMLError)
 
 
 def as_yaml() -> str:
@@ -52,6 +57,23 @@ def unused_files(arguments: Sequence[str], node_name: str) -> list[str]:
     return warnings
 
 
+def doubtful_rules(arguments: Sequence[str], node_name: str) -> list[str]:
+    """Return a warning, of one sentence, for each value of which ROS takes nothing without a word.
+
+    Args:
+        arguments: the command line, which ROS has taken.
+        node_name: the node's fully qualified name, such as /planner.
+    """
+    rules = [rule.partition(":=")[0].rpartition(":") for rule in _values_of(("-p", "--param"), arguments)]
+    elsewhere = [f"{name} is given to the node {node}, and not to {node_name}" for node, _, name in rules
+                 if node and f"/{node}" != node_name]
+    counts = Counter(rules)
+    twice = [f"-p {''.join(rule)} is given {count} times; the last one counts" for rule, count in counts.items() if count > 1]
+    in_files = [f"{file}: {repeated}; the last one counts" for file in _parameter_files(arguments)
+                if (repeated := _repeated_parameter(file))]
+    return [one_line(warning) for warning in (*elsewhere, *twice, *in_files)]
+
+
 def _comment(text: str, indent: str) -> list[str]:
     start = f"{indent}# "
     return textwrap.wrap(text, WIDTH, initial_indent=start, subsequent_indent=start, break_long_words=False,
@@ -59,28 +81,48 @@ def _comment(text: str, indent: str) -> list[str]:
 
 
 def _parameter_files(arguments: Sequence[str]) -> Iterator[str]:
+    return _values_of(("--params-file",), arguments)
+
+
+def _values_of(flags: Sequence[str], arguments: Sequence[str]) -> Iterator[str]:
+    """Yield what follows a flag among the arguments that are ROS's."""
     is_for_ros = False
     for argument, following in pairwise((*arguments, "")):
         if argument in ("--ros-args", "--"):
             is_for_ros = argument == "--ros-args"
-        elif is_for_ros and argument == "--params-file":
+        elif is_for_ros and argument in flags:
             yield following
 
 
 def _named_nodes(file: str) -> list[str] | None:
     """Return the names or wildcards of the nodes that a file has sections for; None where it cannot be read."""
     try:
-        # A pipe, which ROS has read already, would block.
-        if not os.path.isfile(file) or os.path.getsize(file) > MAX_BYTES:
-            return None
-        return list(_sections(load_plain(Path(file).read_text("utf-8"), aliases=False)))  # which ROS refuses too
-    except (OSError, ValueError, RecursionError, OverflowError, yaml.YAMLError):
+        return list(_sections(_read(file)))
+    except _UNREADABLE:
         return None
+
+
+def _repeated_parameter(file: str) -> str:
+    """Say which parameter a section of a file has twice; "" where there is none, or the file cannot be read."""
+    try:
+        _read(file, unique_keys=SECTION)
+    except RepeatedKey as error:
+        return str(error)
+    except _UNREADABLE:
+        pass
+    return ""
+
+
+def _read(file: str, unique_keys: bool | str = False) -> Any:
+    # A pipe, which ROS has read already, would block.
+    if not os.path.isfile(file) or os.path.getsize(file) > MAX_BYTES:
+        raise OSError
+    return load_plain(Path(file).read_text("utf-8-sig"), aliases=False, unique_keys=unique_keys)  # aliases ROS refuses, too
 
 
 def _sections(tree: Any, name: str = "") -> Iterator[str]:
     for key, value in tree.items() if isinstance(tree, dict) else ():
-        if key == "ros__parameters":
+        if key == SECTION:
             yield name
         else:
             yield from _sections(value, "/".join([name, *filter(None, key.split("/"))]))

@@ -1,7 +1,9 @@
 """The node's parameters, declared from the options of dataclasses: the library's and the node's own."""
 
+import array
 import difflib
 import math
+import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,7 +15,7 @@ from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, 
 from dubins_rrt_ros.planning.maps.files import MAX_CELLS, UNKNOWN_GREY
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 from dubins_rrt_ros.planning.text import quoted_name
-from dubins_rrt_ros.planning.vehicle import overridden
+from dubins_rrt_ros.planning.vehicle import OVERRIDING, overridden
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class NodeOptions:
         convert_options(self)
         if not self.global_frame:
             raise OptionError("global_frame is ''; give the name of a frame, such as map")
+        for name in ("global_frame", "robot_base_frame"):
+            _check_frame(name, getattr(self, name))
         if self.free_thresh >= self.occupied_thresh:
             raise OptionError(f"free_thresh is {self.free_thresh:g} and occupied_thresh {self.occupied_thresh:g}; make "
                               "free_thresh the smaller one")
@@ -71,6 +75,15 @@ class NodeOptions:
     def thresholds(self) -> Thresholds:
         """The thresholds of cells in grids by topic."""
         return Thresholds.of_fractions(self.free_thresh, self.occupied_thresh)
+
+
+def _check_frame(name: str, frame: str) -> None:
+    if frame.startswith("/"):
+        raise OptionError(f"{name} is {quoted_name(frame)}; tf2 knows no frames with a leading slash, give "
+                          f"{quoted_name(frame.lstrip('/'))}")
+    if not frame.isprintable() or frame != frame.strip():
+        raise OptionError(f"{name} is {quoted_name(frame)}; give the name of a frame, such as map, without line breaks, control "
+                          "characters and blanks around it")
 
 
 @dataclass(frozen=True)
@@ -141,8 +154,25 @@ class Parameters:
     def overridden(self) -> list[str]:
         """Return a warning, of one sentence, for each value given at start-up in whose place another one is used."""
         given = getattr(self._node, "_parameter_overrides", {})
-        values = {name: parameter.value for name, parameter in given.items()}
-        return [f"{name} has no effect, as {by} takes its place" for name, by in overridden(values).items()]
+        return _without_effect({name: parameter.value for name, parameter in given.items()})
+
+    def without_effect(self, changes: Iterable) -> list[str]:
+        """Return the same for each of changes, given as rclpy's Parameters that are not set yet, that differs from its value."""
+        values = self._values()
+        changed = {change.name for change in changes if change.name in OPTIONS and change.value != values[change.name]}
+        given = {change.name: change.value for change in changes}
+        return _without_effect({name: value for name, value in (values | given).items()
+                                if name in changed or name in OVERRIDING})
+
+    def undeclared(self, changes: Iterable) -> SetParametersResult | None:
+        """Return the refusal of changes of which one is of no parameter, that says which was meant; None where there are all.
+
+        What rclpy says of it has no name.
+        """
+        name = next((change.name for change in changes if not self._node.has_parameter(change.name)), None)
+        if name is None:
+            return None
+        return SetParametersResult(successful=False, reason=f"There is no parameter {quoted_name(name)}; {_near(name)}")
 
     def pending(self, changes: Iterable) -> list:
         """Return what remains to be set of changes, given as rclpy's Parameters.
@@ -160,7 +190,7 @@ class Parameters:
 
         rclpy calls this last, after its own checks of ranges and read-only parameters, whose reasons name no remedy.
         """
-        wanted = {change.name: change.value for change in changes if change.name in OPTIONS}
+        wanted = {change.name: _listed(change.value) for change in changes if change.name in OPTIONS}
         try:
             for name, value in wanted.items():
                 _check_alone(name, value)
@@ -173,7 +203,8 @@ class Parameters:
         try:
             configuration({**self._values(), **wanted})
         except OptionError as error:
-            if len(wanted) > 1:
+            named = re.findall(r"\w+", str(error))
+            if len(wanted) > 1 or not any(name in named for name in OPTIONS.keys() - wanted.keys()):
                 raise
             service = f"{self._node.get_fully_qualified_name()}/set_parameters_atomically"
             raise OptionError(f"{error}; while the node runs, change what belongs together in one call of {service}") from None
@@ -248,7 +279,20 @@ def read_only(name: str) -> str:
 
 
 def _unknown(name: str) -> str:
+    return f"Unknown parameter {quoted_name(name)} is ignored; {_near(name)}"
+
+
+def _near(name: str) -> str:
+    """Return which parameter was likely meant by an unknown name, or where they are listed."""
     # A section that is nested too deep is part of the name.
     near = difflib.get_close_matches(name.rpartition(".")[2].lower(), OPTIONS, n=1)
-    remedy = f"did you mean {near[0]!r}?" if near else "planner --help lists the parameters"
-    return f"Unknown parameter {quoted_name(name)} is ignored; {remedy}"
+    return f"did you mean {near[0]!r}?" if near else "planner --help lists the parameters"
+
+
+def _without_effect(given: Mapping[str, Any]) -> list[str]:
+    return [f"{name} has no effect, as {by} takes its place" for name, by in overridden(given).items()]
+
+
+def _listed(value: Any) -> Any:
+    """Return an array of rclpy's as a list, which reads better in a message."""
+    return value.tolist() if isinstance(value, array.array) else value

@@ -96,11 +96,16 @@ class PlannerNode(ManagedNode):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; a refusal says what to do, which that of rclpy, which would look first, does not."""
+        if refusal := self._parameters_in_use.undeclared(parameter_list):
+            return refusal
         pending = self._parameters_in_use.pending(parameter_list)
         verdict = self._parameters_in_use.check(pending)
         if not verdict.successful or not pending:
             return verdict
+        warnings = self._parameters_in_use.without_effect(pending)
         result = super().set_parameters_atomically(pending)
+        for warning in warnings:
+            self.get_logger().warning(warning)
         if any(change.name in ("wheelbase", "max_steering_angle") for change in pending):
             self._log_derived_radius()
         return result

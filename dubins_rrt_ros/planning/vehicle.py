@@ -27,10 +27,18 @@ _CORNER = re.compile(rf"\[{_NUMBER},{_NUMBER}(?:,\s*)?\]", re.ASCII)
 _OUTLINE = re.compile(rf"\s*\[\s*(?:{_CORNER.pattern}\s*,\s*)*(?:{_CORNER.pattern}\s*)?\]\s*", re.ASCII)
 
 
+#: Options that take the place of others.
+OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius"}
+
+
 def overridden(given: Mapping[str, Any]) -> dict[str, str]:
     """Return which of the options that were given have no effect, each with the given one that takes its place."""
-    pairs = ("robot_radius", "footprint"), ("turning_radius", "wheelbase")
-    return {name: by for name, by in pairs if name in given and given.get(by)}
+    return {name: by for by, name in OVERRIDING.items() if name in given and _is_set(given.get(by))}
+
+
+def _is_set(value: Any) -> bool:
+    """Return False for a wheelbase of 0, and for the text of a footprint without corners."""
+    return bool(value.strip(" \t\r\n[]") if isinstance(value, str) else value)
 
 
 def _read_footprint(value: Any) -> Footprint:
@@ -120,9 +128,10 @@ class Vehicle:
             raise OptionError(f"wheelbase is {self.wheelbase:g} m and max_steering_angle {self.max_steering_angle:g} rad; "
                               "set both at once, or neither and turning_radius")
         if self.wheelbase > 0:
-            self._derive("turning_radius", self.wheelbase / math.tan(self.max_steering_angle))
+            self._derive("turning_radius", self.wheelbase / math.tan(self.max_steering_angle), f"wheelbase {self.wheelbase:g} m "
+                         f"and max_steering_angle {self.max_steering_angle:g} rad make a turning radius of")
         if self.footprint:
-            self._derive("robot_radius", max(math.hypot(x, y) for x, y in self.footprint))
+            self._derive("robot_radius", max(math.hypot(x, y) for x, y in self.footprint), "footprint has its farthest corner at")
 
     @classmethod
     def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = 0.2,
@@ -180,6 +189,9 @@ class Vehicle:
         inscribed = self.inscribed_radius
         return self.turning_radius if self.turning_radius >= inscribed else 2 * inscribed
 
-    def _derive(self, name: str, value: float) -> None:
+    def _derive(self, name: str, value: float, what: str) -> None:
         derived = next(item for item in options(Vehicle) if item.name == name)
-        object.__setattr__(self, name, derived.convert(value))
+        try:
+            object.__setattr__(self, name, derived.convert(value))
+        except OptionError:
+            raise OptionError(f"{what} {value:.6g} m; that may be {derived.allowed()}") from None

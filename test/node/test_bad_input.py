@@ -265,4 +265,18 @@ def test_parameters_that_are_set_one_by_one_are_taken_one_by_one(talk):
                 for name, value in (("goal_bias", 0.1), ("samples", -1), ("no_such", 1), ("goal_bias", 0.05))]
     results = talk.client.call(SetParameters, "set_parameters", parameters=messages).results
     assert [result.successful for result in results] == [True, False, False, True]
-    assert "undeclared" in results[2].reason
+    assert results[2].reason == "There is no parameter 'no_such'; planner --help lists the parameters"
+    assert "did you mean 'turning_radius'?" in talk.client.set_parameters(goal_bias=0.2, turnig_radius=1.0).reason
+    assert read(talk.client, "goal_bias").double_value == 0.05
+
+
+def test_a_value_in_whose_place_another_one_is_used_is_told_when_it_is_set(talk):
+    said = len(talk.process.output)
+    try:
+        assert talk.client.set_parameters(footprint="[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]").successful
+        assert talk.client.set_parameters(robot_radius=0.2, turning_radius=1.5).successful  # the first stays as it was
+        assert talk.client.set_parameters(robot_radius=0.25).successful
+        talk.client.wait_for_word("robot_radius has no effect, as footprint takes its place")
+    finally:
+        assert talk.client.set_parameters(footprint="", robot_radius=0.2, turning_radius=1.0).successful
+    assert talk.process.output[said:].count("has no effect") == 1

@@ -4,6 +4,7 @@ import array
 import json
 import math
 import os
+import re
 from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ import rclpy
 import yaml
 from rclpy.parameter import Parameter
 
-from dubins_rrt_ros.node.parameter_files import WIDTH, as_yaml, unused_files
+from dubins_rrt_ros.node.parameter_files import WIDTH, as_yaml, doubtful_rules, unused_files
 from dubins_rrt_ros.node.parameters import OPTIONS, READ_ONLY, Parameters, configuration
 from dubins_rrt_ros.planning import OptionError, Problem, Settings, Vehicle, options
 from dubins_rrt_ros.planning.text import LONGEST
@@ -205,6 +206,60 @@ def test_a_wrong_value_on_the_command_line_is_refused(started, argument, found):
     with pytest.raises(OptionError) as refusal:
         Parameters(started("-p", argument))
     assert str(refusal.value).startswith(f"{argument.partition(':=')[0]} is {found}; ")
+
+
+@pytest.mark.parametrize(("given", "says"), [
+    ({"footprint": "[[1000000, 1], [-1, 1], [-1, -1]]"}, "footprint has its farthest corner at 1e+06 m; that may be "),
+    ({"wheelbase": 2.0, "max_steering_angle": 1e-9},
+     "wheelbase 2 m and max_steering_angle 1e-09 rad make a turning radius of 2e+09 m; that may be a number from 0.001 to 10000"),
+    ({"wheelbase": 0.001, "max_steering_angle": 1.57}, "wheelbase 0.001 m and max_steering_angle 1.57 rad make a turning")])
+def test_what_follows_from_a_value_is_refused_by_the_value_s_name(declared, given, says):
+    with pytest.raises(OptionError) as refusal:
+        declared(**given)
+    assert str(refusal.value).startswith(says)
+
+
+@pytest.mark.parametrize("name", ["global_frame", "robot_base_frame"])
+@pytest.mark.parametrize(("frame", "remedy"), [
+    ("/map", "give 'map'"), ("//a/b", "give 'a/b'"), (" map", "blanks"), ("map\n[ERROR] x", "line breaks"),
+    ("\x1b[2Jmap", "control")])
+def test_a_frame_that_tf2_does_not_know_is_refused(declared, name, frame, remedy):
+    with pytest.raises(OptionError, match=re.escape(f"{name} is {frame!r}; ")) as refusal:
+        declared(**{name: frame})
+    assert remedy in str(refusal.value) and str(refusal.value).isprintable()
+
+
+def test_a_refusal_names_the_other_values_only_where_they_matter(declared):
+    node, together = declared(), "change what belongs together in one call of /holder/set_parameters_atomically"
+    assert together in change(node, wheelbase=2.0).reason and together in change(node, free_thresh=0.9).reason
+    assert change(node, path_spacing=0.0005).reason == "path_spacing is 0.0005; give 0 or at least 0.001 [m]"
+    assert together not in change(node, preferred_clearance=-0.5).reason
+    assert together not in change(node, footprint="[[1000000, 1], [-1, 1], [-1, -1]]").reason
+    assert change(node, turning_radius=[1.0]).reason.startswith("turning_radius is [1.0]; ")
+
+
+@pytest.mark.parametrize("namespace", ["", "/ns"])
+def test_rules_are_warned_of_exactly_where_ros_takes_nothing_from_them(started, namespace):
+    for node_name in ("", "planner:", "other:", "planer:"):  # ROS refuses all but plain names
+        rule = f"{node_name}samples:=10"
+        node = started("-r", f"__ns:={namespace or '/'}", "-p", rule)
+        is_used = Parameters(node).read().settings.samples == 10
+        warnings = doubtful_rules(["planner", "-p", "x:y:=1", "--ros-args", "-p", rule], node.get_fully_qualified_name())
+        assert warnings == ([] if is_used else [
+            f"samples is given to the node {node_name[:-1]}, and not to {namespace}/planner"]), rule
+
+
+def test_of_a_value_that_is_given_twice_the_last_one_counts_and_that_is_told(started, tmp_path):
+    arguments = ["-p", "samples:=5", "-p", "seed:=1", "--param", "samples:=6"]
+    assert Parameters(started(*arguments)).read().settings.samples == 6
+    assert doubtful_rules(["--ros-args", *arguments], "/planner") == ["-p samples is given 2 times; the last one counts"]
+    file = tmp_path / "p.yaml"
+    file.write_text("/**:\n  ros__parameters:\n    samples: 5\n    seed: 1\n    samples: 6\n")
+    assert Parameters(started("--params-file", file)).read().settings.samples == 6
+    assert doubtful_rules(["--ros-args", "--params-file", str(file)], "/planner") == [
+        f"{file}: samples is given twice, in lines 3 and 5; the last one counts"]
+    file.write_text("planner: {ros__parameters: {samples: 5}}\nplanner: {ros__parameters: {seed: 1, a: {b: 1, b: 2}}}\n")
+    assert doubtful_rules(["--ros-args", "--params-file", str(file)], "/planner") == []
 
 
 @pytest.mark.parametrize(("name", "remedy"), [

@@ -74,7 +74,7 @@ def test_an_unknown_argument_ends_it_with_the_usage(planners, arguments):
     ({"publish_tree": "often"}, ["publish_tree is 'often'", "true or false"]),
     ({"goal_tolerance_yaw": 4.0}, ["goal_tolerance_yaw is 4.0", "to 3.14"]), ({"seed": -2}, ["seed is -2", "from -1"]),
     ({"wheelbase": 2.0}, ["wheelbase is 2 m", "set both"]), ({"max_steering_angle": 0.5}, ["0.5 rad", "set both"]),
-    ({"wheelbase": 1000.0, "max_steering_angle": 0.001}, ["turning_radius is", "to 10000"]),
+    ({"wheelbase": 1000.0, "max_steering_angle": 0.001}, ["wheelbase 1000 m and max_steering_angle 0.001 rad", "to 10000"]),
     ({"global_frame": ""}, ["global_frame is ''", "give the name"]), ({"max_map_cells": 0}, ["max_map_cells is 0", "from 1"]),
     ({"use_sim_time": "abc"}, ["use_sim_time"]),
     ({"map_file": "nowhere.yaml"}, ["map_file", "nowhere.yaml", "no such map file", "maze.yaml"]),
@@ -105,7 +105,9 @@ def test_a_broken_map_file_ends_it_with_one_line(installed_planners, map_yaml):
     (["-r", "__node:=no-name"], ["no-name"]), (["-r", "__node:=2fast"], ["2fast"]), (["-r", "__ns:=/2fast"], ["2fast"]),
     (["-r", "plan:=no//name"], ["no//name"]), (["-r", "plan:="], ["plan:="]), (["-p", "samples"], ["samples"]),
     (["-p", "samples:=[1, a"], ["samples"]), (["--params-file", "nowhere.yaml"], ["nowhere.yaml"]),
-    (["--log-level", "loud"], ["loud"]), (["--fast"], ["--fast"]),
+    (["--log-level", "loud"], ["loud"]), (["--fast"], ["ROS knows none of the arguments ['--fast']"]),
+    (["-p", "samples=3"], ["'-p samples=3'", "give -p NAME:=VALUE"]), (["-p"], ["give -p NAME:=VALUE"]),
+    (["--params-file", "/"], ["planner --print-parameters"]),
 ])
 def test_a_bad_ros_argument_is_named(planners, arguments, words):
     assert_names(planners.start(*arguments), words)
@@ -136,6 +138,17 @@ def test_a_parameter_file_that_has_nothing_for_the_node_gets_a_warning(planners,
     file.write_text(content)
     process = planners.start("--params-file", str(file))
     planners.client().wait_for(lambda: f"Parameter file '{file}' is ignored" in process.output, "the warning")
+
+
+@pytest.mark.slow
+def test_what_ros_takes_nothing_of_is_told_by_the_node(planners, tmp_path):
+    file = tmp_path / "twice.yaml"
+    file.write_text("/**:\n  ros__parameters:\n    samples: 3\n    samples: 4\n")
+    process = planners.start("--params-file", str(file), "-p", "planer:seed:=1", "-p", "seed:=2", "-p", "seed:=3")
+    client = planners.client()
+    for words in ("samples is given twice, in lines 3 and 4; the last one counts", "seed is given to the node planer, and not to",
+                  "-p seed is given 2 times; the last one counts"):
+        client.wait_for(lambda words=words: words in process.output, "the warning")
 
 
 def test_a_parameter_that_there_is_not_gets_a_warning_with_a_suggestion(planners, map_yaml, tmp_path):

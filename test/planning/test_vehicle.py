@@ -85,5 +85,5 @@ def test_a_footprint_that_is_no_outline_is_refused_with_an_example(footprint):
 
 
 def test_a_footprint_beyond_the_range_of_discs_is_refused():
-    with pytest.raises(OptionError, match=r"robot_radius is .*from 0 to 1000"):
+    with pytest.raises(OptionError, match=r"footprint has its farthest corner at 1e\+09 m; .*from 0 to 1000"):
         Vehicle(footprint="[[1e9, 0], [0, 1], [-1, -1]]")

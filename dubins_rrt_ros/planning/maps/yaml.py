@@ -14,7 +14,7 @@ class RepeatedKey(yaml.YAMLError):
     """A key that a mapping has twice; parsers differ in which of its values they take."""
 
 
-def load_plain(text: str, *, aliases: bool, unique_keys: bool = False) -> Any:
+def load_plain(text: str, *, aliases: bool, unique_keys: bool | str = False) -> Any:
     """Return the contents of a YAML document as dicts, lists and texts.
 
     YAML 1.1 would make 1e-2 text, 010 eight, an image named 2024 a number, and a mode named off a boolean. Tabs are taken where
@@ -24,7 +24,8 @@ def load_plain(text: str, *, aliases: bool, unique_keys: bool = False) -> Any:
         text: the document.
         aliases: True if aliases are allowed; a few lines of them can stand for billions of values, which take time to go
             through.
-        unique_keys: True if a key must not be given twice in a mapping, of which the last value would be taken.
+        unique_keys: True if a key must not be given twice in a mapping, of which the last value would be taken; a name if it
+            must not in the mappings that are the values of this key.
 
     Raises:
         RepeatedKey: a key is given twice where it must not.
@@ -47,7 +48,7 @@ class _Loader(yaml.BaseLoader):
     """
 
     aliases: ClassVar[bool]
-    unique_keys: ClassVar[bool]
+    unique_keys: ClassVar[bool | str]
 
     def scan_to_next_token(self) -> None:
         super().scan_to_next_token()
@@ -58,8 +59,11 @@ class _Loader(yaml.BaseLoader):
             super().scan_to_next_token()
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        if self.unique_keys:
+        if self.unique_keys is True:
             _refuse_repeated_keys(node)
+        for key, value in node.value if isinstance(self.unique_keys, str) else ():
+            if key.value == self.unique_keys and isinstance(value, yaml.MappingNode):
+                _refuse_repeated_keys(value)
         return super().construct_mapping(node, deep)
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
