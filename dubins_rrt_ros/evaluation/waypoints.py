@@ -38,6 +38,10 @@ LEG = Settings(samples=300, planning_time=1.0, seed=1, length_proof=False, prefe
 WHOLE = Settings(samples=3000, planning_time=3.0, seed=1, length_proof=False, preferred_clearance=0.0)
 #: A first path of a leg is assumed to be longer than the planned one by no more than this share.
 DRAFT_EXCESS = 0.1
+#: How the poses of a problem are tried. With the time of a draft they would depend on how busy the machine is.
+DRAW = replace(DRAFT, planning_time=3.0)
+#: Number of poses in a row that cannot be reached after which a pose is taken to lead nowhere.
+MOST_TRIES = 20
 
 
 def main() -> int:
@@ -119,14 +123,22 @@ def _sum(legs: list[_Leg], chain: list[int]) -> float:
 
 
 def _random_poses(world: World, rng: np.random.Generator) -> list[Pose]:
-    """Draw four free poses of which each can be reached from the one before."""
+    """Draw four free poses of which each can be reached from the one before; others where one leads nowhere."""
     corners = world.map.corners()
     poses: list[Pose] = []
+    tries = 0
     while len(poses) < 4:
         x, y = rng.uniform(corners.min(axis=0), corners.max(axis=0)).tolist()
         pose = x, y, float(rng.uniform(-math.pi, math.pi))
-        if world.field.pose_is_free(pose, VEHICLE) and (not poses or _length(world, poses[-1], pose, DRAFT) < math.inf):
+        if not world.field.pose_is_free(pose, VEHICLE):
+            continue
+        tries += 1
+        if not poses or _length(world, poses[-1], pose, DRAW) < math.inf:
             poses.append(pose)
+            tries = 0
+        elif tries == MOST_TRIES:
+            poses.clear()
+            tries = 0
     return poses
 
 

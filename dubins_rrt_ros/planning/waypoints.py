@@ -1,9 +1,8 @@
 """plan_through(): one path over waypoints, whose free headings are chosen so that the whole is shortest.
 
-The headings are chosen by dynamic programming over HEADINGS of them at each waypoint; `search/legs.py` says what a leg costs
-between two. Where obstacles are in the way of a leg, paths of it are planned in several headings, then between the headings that
-were chosen, and the headings are chosen again until they stay. At last they are turned more finely, each leg is planned with its
-share of the samples, and the headings are turned once more.
+The headings are chosen among HEADINGS of them at each waypoint, as `waypoint_headings.py` says, and then turned more finely. That
+gives the first path. If there is time, paths are sought between other headings that promise a shorter whole, each leg is planned
+with its share of the samples, and the headings are turned once more.
 """
 
 import math
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ._kernels import COMPILED
 from .answer import defect_message, end_clause, not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
@@ -27,25 +25,20 @@ from .planner import AUDIT_RESERVE, SAME, plan
 from .problem import Pose, Problem, Waypoint, checked_waypoints, demand_problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective
-from .search.cost_to_go import CostToGo
 from .search.goal_poses import goal_poses
-from .search.hybrid_astar import HybridAStarRuns
 from .search.known_path import KnownPath
-from .search.legs import Leg, cheapest_chain, first_impassable
+from .search.legs import Leg
 from .search.smoothing import smooth
 from .search.tree import Tree
 from .settings import MIN_PLANNING_TIME, Settings, demand_settings
 from .stops import HEADINGS, Stop, last_place, least_length, legs_along, passing_indices, stops_of
 from .text import at
+from .waypoint_headings import HeadingChoice
 from .work import Work
 from .world import problem_with_costs, world_of
 
-#: Number of headings at either end with which a leg between obstacles is planned first.
-FIRST_HEADINGS = 12
-#: Maximum number of times that legs are planned between the headings that were chosen, and the headings chosen again.
-ROUNDS = 4
-#: Maximum number of poses that hybrid A* expands for such a path, and number in one step.
-DRAFT_EXPANSIONS, STEP = (8192, 512) if COMPILED else (512, 32)
+#: Share of the time left for the legs in which other headings are tried.
+OTHERS_SHARE = 0.4
 #: Angles to both sides by which headings are turned, one after the other [rad], and number of headings that are tried each time.
 TURNS, TRIES = (math.tau / HEADINGS, math.tau / HEADINGS / 8, math.tau / HEADINGS / 64), 33
 
@@ -94,11 +87,8 @@ class _Call:
         self._clock.restart()
         self._clock.reserve = min(AUDIT_SHARE * settings.planning_time, MOST_FOR_AUDIT)
         self._samples = 0
-        self._found_by = ""
-        self._explored: set[int] = set()
-        self._seed_path, self._seeded = seed_path, set[int]()  # numbers of the legs that a part of it is a path of
+        self._seed_path = seed_path
         self._rng = np.random.default_rng((settings.seed, 4))  # the numbers that Smoother.simplify draws too, no others
-        self._failures: dict[int, Plan] = {}  # by the id of the leg
         self._proved: dict[tuple[Waypoint, Waypoint], float] = {}  # lower bounds of legs between poses [m]
         self._time_to_first: float | None = None
         self._aim = self._free_goal()
@@ -119,18 +109,19 @@ class _Call:
             return self._leave_start(stops)
         if unreachable := self._without_room(stops):
             return unreachable
-        legs = self._legs(stops)
-        headings = self._chosen_headings(legs)
-        if headings is None:
-            return self._first_leg_without_path(stops, legs)
-        paths = self._turned(stops, [leg.path(i, j) for leg, (i, j) in zip(legs, pairwise(headings), strict=True)])
-        first = self._joined(stops, paths)
+        choice = self._heading_choice(stops)
+        if not choice.choose():
+            return self._first_leg_without_path(stops, choice)
+        paths = self._turned(stops, choice.paths())
+        first = self._joined(stops, paths, choice.found_by)
         if self._on_progress and first.path:
             self._on_progress(Progress(first.samples, first.planning_time, first.length, True, lambda: first, lambda: first.tree,
                                        first.cost))
         if self._settings.planner == "rrt" or self._clock.is_over:
             return first
-        return self._joined(stops, self._turned(stops, self._planned(paths)), first)
+        if choice.try_others(self._clock.elapsed + self._time(OTHERS_SHARE)):
+            paths = min(paths, self._turned(stops, choice.paths()), key=self._cost)
+        return self._joined(stops, self._turned(stops, self._planned(paths)), choice.found_by, first)
 
     def _single_leg(self, stops: list[Stop]) -> Plan:
         """Return the plan where all waypoints are at the start or at the goal."""
@@ -166,82 +157,22 @@ class _Call:
             stops[n] = stop._replace(poses=room)
         return None
 
-    def _legs(self, stops: list[Stop]) -> list[Leg]:
-        """Return the legs, each with its part of the seed path where that is free."""
+    def _heading_choice(self, stops: list[Stop]) -> HeadingChoice:
+        """Return the choice of headings at the stops; legs have their parts of the seed path where these are free."""
         seed, vehicle = self._seed_path, self._problem.vehicle
         parts = legs_along(seed, stops) if seed and seed.radius == vehicle.turning_radius else None
-        if parts is None:
-            return [self._leg(here, there) for here, there in pairwise(stops)]
-        stops[1:-1] = [stop.with_pose(part.end) for stop, part in zip(stops[1:-1], parts, strict=False)]
+        if parts is not None:
+            stops[1:-1] = [stop.with_pose(part.end) for stop, part in zip(stops[1:-1], parts, strict=False)]
         legs = [self._leg(here, there) for here, there in pairwise(stops)]
-        for n, (leg, part) in enumerate(zip(legs, parts, strict=True)):
+        choice = HeadingChoice(legs, self.world, self._problem, self._settings, self._objective, self._rng, self._clock,
+                               self._leg_plan)
+        for number, part in enumerate(parts or ()):
             if KnownPath(part, self.world.field, vehicle).is_free:
-                leg.add(part)
-                self._seeded.add(n)
-                self._found_by = "seed_path"
-        self._explored = set(self._seeded)
-        return legs
+                choice.know(number, part)
+        return choice
 
     def _leg(self, here: Stop, there: Stop) -> Leg:
         return Leg(here.poses, there.poses, self.world.field, self._problem.vehicle)
-
-    # Headings
-
-    def _chosen_headings(self, legs: list[Leg]) -> list[int] | None:
-        """Return the index of a pose at each stop; None where no path is found over all of them."""
-        headings = self._cheapest_headings(legs)
-        for _ in range(ROUNDS):
-            if headings is None or self._clock.poll():
-                break
-            for n, (leg, (i, j)) in enumerate(zip(legs, pairwise(headings), strict=True)):
-                if not leg.is_curve(i, j) and n not in self._seeded:
-                    self._draft(leg, leg.starts[i], [leg.ends[j]])
-            before, headings = headings, self._cheapest_headings(legs)
-            if headings == before:
-                break
-        return headings
-
-    def _cheapest_headings(self, legs: list[Leg]) -> list[int] | None:
-        """Return the headings with which the legs are cheapest, as far as paths of them are known."""
-        while True:
-            headings = cheapest_chain([leg.costs for leg in legs])
-            ends = list(pairwise(headings))
-            unsure = [n for n, (leg, (i, j)) in enumerate(zip(legs, ends, strict=True)) if not leg.decide(i, j, self._clock.poll)]
-            if not unsure:
-                return headings if first_impassable([leg.costs for leg in legs]) is None else None
-            for n in unsure:
-                if legs[n].has_obstacles and n not in self._explored:
-                    self._explored.add(n)
-                    self._explore(legs[n])
-
-    def _explore(self, leg: Leg) -> None:
-        """Look for paths of a leg between several headings at its ends; where none is found so, plan it."""
-        to_end = CostToGo(self.world.field, self._problem.vehicle.inscribed_radius, leg.ends[0][:2])
-        starts, ends = (poses[::max(1, len(poses) // FIRST_HEADINGS)] for poses in (leg.starts, leg.ends))
-        pairs = [(start, leg.ends) for start in starts] + [(starts[0], [end]) for end in ends if len(ends) > 1]
-        drafts = [self._draft(leg, start, some, to_end) for start, some in pairs]
-        if not any(drafts) and not self._clock.poll():
-            found = self._leg_plan(leg)
-            if found.path:
-                leg.add(found.path)
-                self._found_by = found.found_by
-            self._failures[id(leg)] = found
-
-    def _draft(self, leg: Leg, start: Pose, ends: Sequence[Pose], to_end: CostToGo | None = None) -> bool:
-        """Add the path to the leg that hybrid A* finds with little work, from a start to one end or to any; return True if so."""
-        problem = Problem(self.world, start=start, goal=ends[0], any_goal_heading=len(ends) > 1)
-        field, vehicle = self.world.field, self._problem.vehicle
-        runs = HybridAStarRuns(problem, self._settings, field, to_end or CostToGo.to_goal(problem, field))
-        path, left = None, DRAFT_EXPANSIONS
-        while path is None and left > 0 and not runs.exhausted and not self._clock.poll():
-            path, left = runs.run(STEP, math.inf, Work(self._clock.poll)), left - STEP
-        if path is None:
-            return False
-        for first_round in (True, False):
-            path = smooth(path, vehicle, field, self._rng, first_round, Work(self._clock.poll), self._objective)
-        self._found_by = "hybrid_astar"
-        leg.add(path)
-        return True
 
     def _leg_plan(self, leg: Leg) -> Plan:
         """Plan a leg from its first start to its end."""
@@ -308,7 +239,7 @@ class _Call:
 
     # Answers
 
-    def _joined(self, stops: list[Stop], paths: list[Path], before: Plan | None = None) -> Plan:
+    def _joined(self, stops: list[Stop], paths: list[Path], found_by: str, before: Plan | None = None) -> Plan:
         """Return the plan with the path of all legs, audited as a whole; without time for that, the path before, if any."""
         path = Path.of_curves(self._problem.start, paths[-1].end, [curve for leg in paths for curve in leg.curves])
         tree = Tree.of_path(path, self._objective.curve_costs(path))
@@ -330,7 +261,7 @@ class _Call:
         bound = min(least_length(self._problem, self._waypoints, self._proved), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
-                            roomy_share=self._objective.roomy_share(path), found_by=self._found_by,
+                            roomy_share=self._objective.roomy_share(path), found_by=found_by,
                             cancelled=self._clock.cancelled)
         return replace(answer, waypoint_indices=tuple(passing_indices(stops, paths, answer.poses())))
 
@@ -341,10 +272,10 @@ class _Call:
         self._clock.reserve = AUDIT_RESERVE * (self._clock.elapsed - began)
         return Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
 
-    def _first_leg_without_path(self, stops: list[Stop], legs: list[Leg]) -> Plan:
+    def _first_leg_without_path(self, stops: list[Stop], choice: HeadingChoice) -> Plan:
         """Return the plan without a path, with what is known of the first leg that has none."""
-        number = first_impassable([leg.costs for leg in legs]) or 0
-        return self._not_reached(stops[number + 1], self._failures.get(id(legs[number])) or self._leg_plan(legs[number]))
+        number, found = choice.failure()
+        return self._not_reached(stops[number + 1], found)
 
     def _not_reached(self, stop: Stop, found: Plan) -> Plan:
         """Return the plan without a path that says which stop is not reached, and what was found instead of a path to it."""

@@ -24,6 +24,7 @@ from dubins_rrt_ros.planning import (
     plan_through,
     prepare,
     rasterise,
+    waypoint_headings,
     waypoints,
 )
 from dubins_rrt_ros.planning.audit import audit_path
@@ -48,7 +49,7 @@ WITH_HEADINGS = [(*BELOW, 0.5), (*ABOVE, 0.5)]
 def _first_headings():
     """Fewer drafts of a leg between obstacles, each of them with interpreted kernels a second."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(waypoints, "FIRST_HEADINGS", scaled(waypoints.FIRST_HEADINGS, least=3))
+        patched.setattr(waypoint_headings, "FIRST_HEADINGS", scaled(waypoint_headings.FIRST_HEADINGS, least=3))
         yield
 
 
@@ -158,6 +159,15 @@ def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_leg
     answer, _ = over_both
     assert_passed(answer, BELOW, ABOVE)
     assert answer.length <= cost[0] * 1.005
+
+
+@needs_compiled
+def test_headings_that_have_to_change_together_do():
+    maze = prepare(load_map("maze"), Vehicle(turning_radius=1.0, robot_radius=0.3))
+    start, goal = (3.900343227164678, 3.5617428353108926, 1.9743385564396059), (9.511084429039158, 11.65597502517, 1.1502302018)
+    places = [(1.3379307262399633, 7.2112163641844145), (9.877238524621449, 6.753414519643179)]
+    answer = plan_through(Problem(maze, start=start, goal=goal), places, SETTINGS)
+    assert answer.length <= 25.721 * 1.005  # of legs that are planned between 36 headings
 
 
 @pytest.mark.parametrize("vehicle", [DISC, CAR], ids=["disc", "car"])

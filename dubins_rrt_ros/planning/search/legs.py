@@ -84,6 +84,8 @@ class Leg:
         self._known: list[_Known] = []
         self._blocked = 0
         self.costs = self._curves.copy()
+        self._bounds = self._curves.copy()
+        self._is_closed = np.zeros(self._curves.shape, bool)
 
     @property
     def has_obstacles(self) -> bool:
@@ -110,6 +112,22 @@ class Leg:
         self._known.append(_Known.of(KnownPath(path, self._field, self._vehicle), self.starts, self.ends))
         self._over_known = np.minimum(self._over_known, self._known[-1].costs)
         self.costs = np.minimum(self._curves, self._over_known)
+
+    def raise_bounds(self, distance: float) -> None:
+        """Take into account that no path of this leg is shorter [m]."""
+        self._bounds = np.maximum(self._bounds, distance)
+
+    def close(self, i: int | slice = slice(None), j: int | slice = slice(None)) -> None:
+        """Take the costs between two headings, or between all, as the least there are: no more paths are sought there."""
+        self._is_closed[i, j] = True
+
+    def is_closed(self, i: int, j: int) -> bool:
+        """Return True if no more paths are sought between two headings: they are closed, or a curve is free there."""
+        return bool(self._is_closed[i, j] or self._is_free[i, j])
+
+    def promises(self) -> np.ndarray:
+        """Return (starts, ends) float64: the costs, or lower bounds where more paths may be sought [m]."""
+        return np.where(self._is_closed | self._is_free, self.costs, np.minimum(self.costs, self._bounds))
 
     def path(self, i: int, j: int) -> Path:
         """Return the cheapest path between two headings, whose cost is decided and finite."""
