@@ -53,7 +53,7 @@ class World(NamedTuple):
     def clearances(self, points: np.ndarray, most: float) -> np.ndarray:
         """Return the distances [m] of (n, 2) points to the obstacles; infinite beyond `most`."""
         found = np.full(len(points), np.inf)
-        (index, _), distance = self.parts.query_nearest(shapely.points(points), most, return_distance=True, all_matches=False)
+        (index, _), distance = self.parts.query_nearest(shapely.points(points), most, return_distance=True)
         found[index] = distance
         if self.free is not None:
             found[~shapely.contains_xy(self.free, points)] = 0

@@ -100,8 +100,9 @@ def test_poses_are_taken_into_the_map_s_own_frame(tmp_path):
     ("map.wkt", "POLYGON EMPTY", "no valid polygon"), ("map.wkt", "POLYGON ((0 0, 1 1, 1 0, 0 1, 0 0))", "no valid polygon"),
     ("map.wkt", "nonsense", "map.wkt"), ("map.json", "{}", "KeyError"),
     ("map.geojson", PLOT.replace("bounds", "wall"), "has not one feature with the role bounds"),
+    ("map.geojson", PLOT.replace("null", '{"role": "bounds"}'), "has not one feature with the role bounds"),
     ("map.yaml", "{}", "KeyError")], ids=["picture", "point", "empty", "crossed", "no WKT", "no GeoJSON",
-                                                                  "no bounds", "no fields"])
+                                                                  "no bounds", "two bounds", "no fields"])
 def test_what_is_no_map_is_refused(name, content, said, tmp_path):
     (tmp_path / name).write_text(content)
     with pytest.raises(UnreadableMap, match=said):

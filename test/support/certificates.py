@@ -76,12 +76,12 @@ def pose_in(grid, x, y, yaw):
     return (*grid.to_map_frame(np.array([x, y])).tolist(), yaw + grid.origin[2])
 
 
-def random_certified(rng, folder):
-    """The certificate of a random small problem, mostly of up to sixty boxes; None where there is no path."""
+def random_certified(rng, folder, seconds):
+    """The certificate of a random small problem, mostly of up to sixty boxes after 0.2 s; None where there is no path."""
     grid = (boxes_grid, maze_grid)[rng.integers(2)](rng, side=18)
     vehicle = Vehicle(turning_radius=float(rng.uniform(0.3, 1.0)), robot_radius=float(rng.uniform(0.15, 0.4)))
     side = 18 * grid.resolution
     start, goal = (pose_in(grid, *rng.uniform(0.1 * side, 0.9 * side, 2), float(rng.uniform(-math.pi, math.pi)))
                    for _ in range(2))
     request = [{}, {}, {"goal_tolerance_xy": 0.2, "goal_tolerance_yaw": 0.3}, {"any_goal_heading": True}][rng.integers(4)]
-    return certified(Problem(grid, vehicle, start, goal, **request), saved(grid, folder), gap=0.1, seconds=0.2)
+    return certified(Problem(grid, vehicle, start, goal, **request), saved(grid, folder), gap=0.1, seconds=seconds)

@@ -31,8 +31,9 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast
 TESTS = Path(__file__).resolve().parents[1]
 #: The tests without a search that are to find the mutants of a module.
 TESTS_OF = {f"dubins_rrt_ros.{module}": [str(TESTS / f"{test}.py") for test in tests.split()] for module, tests in {
-    "checker.bounds": "checker/test_bounds checker/test_spoils", "checker.check": "checker/test_spoils checker/test_check",
-    "checker.levels": "checker/test_levels checker/test_spoils", "checker.maps": "checker/test_maps",
+    "checker.bounds": "checker/test_bounds checker/test_spoils",
+    "checker.check": "checker/test_claims checker/test_spoils checker/test_check",
+    "checker.levels": "checker/test_levels checker/test_spoils", "checker.maps": "checker/test_maps checker/test_claims",
     "planning.audit.cost": "planning/test_audit_cost", "planning.audit.departure": "planning/test_departure",
     "planning.audit.obstacles": "planning/test_audit planning/test_audit_footprint",
     "planning.audit.sweep": "planning/test_audit planning/test_audit_footprint",
