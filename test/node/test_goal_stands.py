@@ -324,6 +324,8 @@ def test_publish_final_publishes_one_path_for_each_request_and_improvements_each
 
 #: Goals in a second, and for how many of them [s].
 RATE, SECONDS = 1000, 10
+#: Goals after which the client hears what has come even where it is late, as on a busy machine.
+HEARING = 20
 
 
 @pytest.mark.slow
@@ -335,11 +337,13 @@ def test_a_thousand_goals_a_second_have_a_path_at_least_every_planning_time_and_
     begin, heard = time.monotonic(), []
     for count in range(RATE * SECONDS):
         client.send("goal_pose", goals[count % len(goals)])
+        if count % HEARING == 0:
+            client.spin_once()
         while time.monotonic() < begin + count / RATE:
             client.spin_once()
         heard += [time.monotonic()] * (len(client.paths) - len(heard))
     client.send("goal_pose", GOAL)
-    client.wait_for(lambda: drive.ends[-1] == GOAL[:2], "the last one's path")
+    client.wait_for(lambda: drive.ends[-1:] == [GOAL[:2]], "the last one's path")
     gaps = np.diff([begin, *heard, time.monotonic()])
     record_property("paths", len(heard))
     record_property("longest time between two of them [s]", float(gaps.max()))

@@ -114,6 +114,7 @@ def test_what_is_left_of_a_path_is_driven_as_before():
         left.check()
         assert left.end == path.end
         assert left.length == pytest.approx(path.length - arc_length, abs=1e-9)
+        assert abs(left.start[2]) <= math.pi
         shares = np.linspace(0.0, 1.0, 30)
         if left.curves:
             expected = path.at((arc_length + shares * left.length) / path.length)

@@ -130,6 +130,7 @@ class Path:
         arcs = np.cumsum(self.lengths[i])
         start = np.empty((1, 3))
         _kernel.poses_along(self.waypoints[i - 1], self.radius, self.words[i], self.lengths[i], np.array([driven]), start)
+        start[0, 2] = math.remainder(start[0, 2], math.tau)
         lengths = self.lengths[i - 1:].copy()
         lengths[1] = np.clip(arcs - driven, 0.0, self.lengths[i])
         return Path(np.concatenate([start, self.waypoints[i:]]), self.words[i - 1:], lengths, self.radius)
