@@ -156,7 +156,7 @@ class LengthProof:
             shares = np.linspace(0, 1, max(8, int(2 * math.dist(point, other) / required) + 2))
             room = self._field.at(point + shares[:, None] * (other - point))
             if (room < 0.5 * required).mean() * math.dist(point, other) > STRING_DEPTH * self._radius:
-                level = _level_between(portal, following, float(shares[room.argmin()]), margin)
+                level = _level_between(portal, following, float(shares[np.argmin(room)]), margin)
                 added = self._graph.cover_between(portal, following, level) or added
         self._graph.link()
         return added
@@ -171,7 +171,7 @@ class LengthProof:
             edges = [edge for edge in self._graph.edges(portal) if len(edge.portal) and len(points)]
             known, number, before = np.full(len(points), math.inf), *np.zeros((2, len(points)), int)
             for index, (source, least) in enumerate(edges):
-                if costs[id(source)].min() + least < known.max():
+                if np.min(costs[id(source)]) + least < known.max():
                     lengths = np.hypot(*(source.boxes[:, None, :2] - points[None]).transpose(2, 0, 1))
                     lengths = costs[id(source)][:, None] + np.maximum(lengths, least)
                     box = lengths.argmin(axis=0)
@@ -313,7 +313,7 @@ class LengthProof:
         curve = dubins.shortest((box[0], box[1], box[6]), (other[0], other[1], other[6]), self._radius)
         poses = curve.poses(max(LEAST_POSE_SPACING, curve.length / 40))
         room = self._field.at(np.ascontiguousarray(poses[:, :2]))
-        return float(room.min()), float(room.argmin()) / max(1, len(room) - 1)
+        return float(room.min()), float(np.argmin(room)) / max(1, len(room) - 1)
 
 
 def _level_between(portal: Portal, following: Portal, share: float, margin: float) -> float:

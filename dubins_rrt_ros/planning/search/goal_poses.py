@@ -52,7 +52,7 @@ class _FreePositions:
             return poses
         start, radius = np.array([self._problem.start]), self._problem.vehicle.turning_radius
         lengths, shorter = (dubins.lengths(start, some, radius) for some in (poses, straight))
-        return np.vstack([poses, straight[[shorter.argmin()]]]) if shorter.min() < lengths.min() - DETOUR * radius else poses
+        return np.vstack([poses, straight[[np.argmin(shorter)]]]) if shorter.min() < lengths.min() - DETOUR * radius else poses
 
     def _at_end_of_straight(self, position: np.ndarray) -> np.ndarray:
         """Return (m, 3) poses at (2,) position to which an arc and a straight lead from the start, as far as the goal allows."""
