@@ -306,6 +306,8 @@ class _Call:
         if path is None:
             return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
         before = self._best
+        if before is None:
+            self._is_right(path, search)  # before time is spent on a better form of it
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and self._best.improves(before):
             self._on_progress(Progress(answer.samples, answer.planning_time, answer.length, True, lambda: answer,

@@ -49,6 +49,18 @@ def test_a_path_found_by_the_time_limit_is_kept(monkeypatch):
     assert not result.cancelled
 
 
+def test_a_path_is_audited_before_time_is_spent_on_its_better_forms(monkeypatch):
+    """As of a footprint of a hundred corners, whose smoothing takes longer than there is time."""
+    def endlessly(path, vehicle, field, rng, first_round, work, *_):
+        while not work.is_over:
+            time.sleep(0.001)
+        time.sleep(0.02)
+        return path
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.smoothing.smooth", endlessly)
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star", planning_time=0.3, preferred_clearance=0.5))
+    assert result.solved, result.message
+
+
 def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
     """By a search with the work that it took the same path is had again."""
     problem, told = Problem(walled_with_a_gap(), VEHICLE, START, GOAL), []
