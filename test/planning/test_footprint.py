@@ -11,7 +11,7 @@ from support.cases import scaled
 from support.footprints import CAR, OUTLINES
 
 from dubins_rrt_ros.planning import Vehicle
-from dubins_rrt_ros.planning.collision.footprint import cover
+from dubins_rrt_ros.planning.collision.footprint import PARTS_WORTH_HULL, cover
 
 
 def check_cover(outline):
@@ -22,7 +22,19 @@ def check_cover(outline):
     assert found.excess == pytest.approx(farthest, rel=0.01, abs=1e-3 * polygon.length)
     for x, y, _, inner in found.discs:
         assert inner < 1e-9 or polygon.buffer(1e-9).contains(shapely.Point(x, y).buffer(inner))
+    check_hull(found, polygon)
     check_parts(found, polygon)
+
+
+def check_hull(found, polygon):
+    """Made wider, it holds the polygon made wider."""
+    assert (len(found.hull) > 0) == (len(found.first_corner) > PARTS_WORTH_HULL)
+    if len(found.hull) == 0:
+        return
+    for wider in (0.0, 0.01, 1.0):
+        hull = shapely.Polygon(found.hull[:, :2] + wider * found.hull[:, 2:])
+        assert hull.exterior.is_ccw and hull.area == pytest.approx(hull.convex_hull.area, rel=1e-9)
+        assert hull.buffer(1e-9 + 1e-6 * wider).contains(polygon.buffer(wider, 64))
 
 
 def check_parts(found, polygon):
@@ -54,6 +66,7 @@ def test_a_footprint_is_covered(kind):
 def test_any_footprint_is_covered(corners):
     outline = [[r * math.cos(angle), r * math.sin(angle)] for angle, r in sorted(corners)]
     polygon = shapely.Polygon(outline)
+    assume(np.hypot(*np.diff(outline, axis=0).T).min() > 1e-6)  # else the direction of an edge is a matter of rounding
     assume(polygon.is_valid and polygon.area > 0.02 * polygon.length**2 and polygon.contains(shapely.Point(0, 0)))
     check_cover(Vehicle(footprint=str(outline)).footprint)
 
@@ -62,4 +75,4 @@ def test_a_car_is_covered_by_few_discs_tightly():
     found = cover(Vehicle(footprint=CAR).footprint)
     assert len(found.discs) == 10
     assert found.excess < 0.19
-    assert len(found.first_corner) == 2
+    assert len(found.first_corner) == 2 and len(found.hull) == 0

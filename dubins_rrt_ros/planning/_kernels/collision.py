@@ -3,7 +3,8 @@
 
 A disc is free where the clearance is great enough. For a polygon the gap between it and the obstacles decides. A lower bound of
 that is the gap of the discs that cover the polygon; where they are too coarse, the polygon widened by some distance is checked
-against the obstacles exactly, and if it is clear, the gap is at least that distance.
+against the obstacles exactly, and if it is clear, the gap is at least that distance. Before a polygon's convex parts, where they
+are many, its hull is checked, which is clear most often and takes a fraction of their time.
 
 Guarantee of conservative advancement for a polygon. No point of the body moves faster than its fastest corner, in metres per
 metre along the curve, so neither does the gap change faster. A pose is free with a gap of at least `margin`; the next one is so
@@ -90,7 +91,7 @@ class CollisionChecker:
 class PolygonChecker(CollisionChecker):
     """The checker of a polygon, as `collision/footprint.py` prepares it. It has working memory: no two threads may share one."""
 
-    def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, worth):
+    def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, hull, worth):
         """Make the checker of a polygon.
 
         Args:
@@ -99,11 +100,13 @@ class PolygonChecker(CollisionChecker):
             corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and their displacement per metre of
                 widening.
             first_corner: (p + 1,) int32: the index of each part's first corner, and n.
+            hull: (h, 4): the same of the convex hull, or none where that is not to be checked first.
             worth: gap from which on the bound by the discs is good enough [m].
         """
         CollisionChecker.__init__(self, clearance, required_clearance)
         self.discs, self.corners, self.first_corner, self.worth = discs, corners, first_corner, worth
-        self.placed = np.empty((len(corners), 2))
+        self.hull, self.outline = hull, hull if len(hull) else corners
+        self.placed = np.empty((max(len(hull), len(corners)), 2))
         self.spans = np.empty((clearance.field.shape[0], 2))
 
     def pose_is_free(self, pose):
@@ -135,7 +138,7 @@ class PolygonChecker(CollisionChecker):
 
     def turn_is_free(self, pose, radius, turn, length, walked):
         """Check a turn."""
-        speed: cython.double = fastest_point(self.corners, radius, turn)
+        speed: cython.double = fastest_point(self.outline, radius, turn)
         sin_theta: cython.double = sin(pose.theta)
         cos_theta: cython.double = cos(pose.theta)
         s: cython.double = walked / speed
@@ -188,20 +191,30 @@ class PolygonChecker(CollisionChecker):
         row: cython.double = cos_yaw * y - sin_yaw * x
         cos_theta: cython.double = cos(pose.theta) * cos_yaw + sin(pose.theta) * sin_yaw
         sin_theta: cython.double = sin(pose.theta) * cos_yaw - cos(pose.theta) * sin_yaw
-        along: cython.double
-        across: cython.double
-        i: cython.int
+        forth_x: cython.double = ahead * cos_theta
+        forth_y: cython.double = ahead * sin_theta
         part: cython.int
-        for i in range(cython.cast(cython.int, self.corners.shape[0])):
-            along = self.corners[i, 0] + wider * self.corners[i, 2]
-            across = self.corners[i, 1] + wider * self.corners[i, 3]
-            self.placed[i, 0] = column + cos_theta * along - sin_theta * across
-            self.placed[i, 1] = row + sin_theta * along + cos_theta * across
+        if self.hull.shape[0] > 0:
+            self.place(self.hull, column, row, cos_theta, sin_theta, wider)
+            if self.clearance.sweep_is_clear(self.placed, 0, self.hull.shape[0], forth_x, forth_y, self.spans):
+                return True
+        self.place(self.corners, column, row, cos_theta, sin_theta, wider)
         for part in range(cython.cast(cython.int, self.first_corner.shape[0]) - 1):
             if not self.clearance.sweep_is_clear(self.placed, self.first_corner[part], self.first_corner[part + 1],
-                                                 ahead * cos_theta, ahead * sin_theta, self.spans):
+                                                 forth_x, forth_y, self.spans):
                 return False
         return True
+
+    def place(self, corners, column, row, cos_theta, sin_theta, wider):
+        """Write corners, displaced as those of what is widened, to `placed`, in the raster's frame."""
+        along: cython.double
+        across: cython.double
+        i: cython.Py_ssize_t
+        for i in range(corners.shape[0]):
+            along = corners[i, 0] + wider * corners[i, 2]
+            across = corners[i, 1] + wider * corners[i, 3]
+            self.placed[i, 0] = column + cos_theta * along - sin_theta * across
+            self.placed[i, 1] = row + sin_theta * along + cos_theta * across
 
 
 @cython.final

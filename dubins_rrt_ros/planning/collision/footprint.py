@@ -1,4 +1,4 @@
-"""A polygon footprint as the kernels need it: discs that cover it, and convex parts that can be made wider."""
+"""A polygon footprint as the kernels need it: discs that cover it, and its hull and convex parts, which can be made wider."""
 
 import math
 from dataclasses import dataclass
@@ -13,13 +13,15 @@ from ..vehicle import Footprint
 #: Number of discs side by side across a footprint, and maximum number one after the other along it; each covers a piece.
 PIECES_PER_WIDTH = 2
 MAX_PIECES_PER_LENGTH = 12
+#: Minimum number of convex parts with which the check of the hull saves time.
+PARTS_WORTH_HULL = 6
 #: Number of points on the rim of each disc that are compared with the footprint.
 RIM_POINTS = 361
 
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """The cover of a footprint, in the vehicle's frame: discs, and convex parts.
+    """The cover of a footprint, in the vehicle's frame: discs, the convex hull, and convex parts.
 
     Attributes:
         discs: (m, 4) float64: x, y and radius of discs that cover it, and radius of a disc with the same centre inside it [m].
@@ -27,12 +29,14 @@ class Cover:
         corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and their displacement
             per metre by which the part is widened, at most sqrt(2).
         first_corner: (p + 1,) int32: index of the first corner of each part, and the number of corners.
+        hull: (h, 4) float64: as `corners`, those of the convex hull; none where there are too few parts for it to be worthwhile.
     """
 
     discs: np.ndarray
     excess: float
     corners: np.ndarray
     first_corner: np.ndarray
+    hull: np.ndarray
 
 
 @lru_cache(maxsize=64)
@@ -40,9 +44,11 @@ def cover(footprint: Footprint) -> Cover:
     """Return the cover of a footprint, whose corners are counter-clockwise."""
     polygon = shapely.Polygon(footprint)
     discs = np.array([_disc_around(piece, polygon) for piece in _pieces(polygon)])
+    excess = float(shapely.distance(polygon, shapely.points(_rims(discs))).max())
     parts = [_widened(part) for part in _convex_parts(footprint)]
     first_corner = np.cumsum([0, *map(len, parts)]).astype(np.int32)
-    return Cover(discs, float(shapely.distance(polygon, shapely.points(_rims(discs))).max()), np.concatenate(parts), first_corner)
+    hull = _widened(_hull(polygon)) if len(parts) >= PARTS_WORTH_HULL else np.empty((0, 4))
+    return Cover(discs, excess, np.concatenate(parts), first_corner, hull)
 
 
 def summary(footprint: Footprint) -> str:
@@ -87,6 +93,12 @@ def _convex_parts(footprint: Footprint) -> list[np.ndarray]:
         parts.append(corners[[ear - 1, ear, (ear + 1) % len(corners)]])
         corners = np.delete(corners, ear, axis=0)
     return [part for part in [*parts, corners] if _turns(part).max() > 0]
+
+
+def _hull(polygon: shapely.Polygon) -> np.ndarray:
+    """Return (k, 2) the corners of the convex hull, counter-clockwise."""
+    corners: np.ndarray = shapely.get_coordinates(polygon.convex_hull)[:-1]
+    return corners if _turns(corners).sum() > 0 else corners[::-1]
 
 
 def _turns(corners: np.ndarray) -> np.ndarray:
