@@ -1,8 +1,12 @@
 """Check a certificate: that its path can be driven, and that no path is shorter than its bound (`docs/proof.md`)."""
 
 import gzip
+import io
 import json
 import math
+import os
+import stat
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +21,11 @@ from .maps import UnreadableMap, World, read_map
 END, SAGITTA = 1e-6, 1e-6
 #: Allowance for rounding, as a share of all lengths: some thousand times what the formulas lose.
 MARGIN = 1e-11
+#: Version of the certificates that are checked, the greatest size of one [bytes], and the greatest number of poses of its path.
+VERSION, MOST_BYTES, MOST_POSES = 1, 2**28, 10**7
+#: What reading a file raises that is no certificate.
+_MALFORMED = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError, MemoryError, EOFError,
+              gzip.BadGzipFile, zlib.error, shapely.errors.ShapelyError)
 #: Greatest range of headings [rad] of the boxes into which those of the goal are cut, and greatest number of boxes across it.
 GOAL_TURN, GOAL_PARTS = 0.1, 8
 #: Number of times that a square is halved at most, both ways, to show that the vehicle's disc cannot be there.
@@ -39,9 +48,8 @@ def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
         UnreadableMap, OSError: a file cannot be read.
     """
     try:
-        data = Path(certificate).read_bytes()
-        text = gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
-        document = json.loads(text, parse_float=_finite, parse_constant=_finite)
+        document = json.loads(_read(certificate), parse_float=_finite, parse_constant=_finite)
+        _check_numbers(document)
         world = read_map(map_path, bool(document["map"]["allow_unknown"]))
         _demand(document["map"] == world.description | {"allow_unknown": document["map"]["allow_unknown"]},
                 "the map is not the one that the certificate is for")
@@ -49,9 +57,34 @@ def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
         _Bound(document, world).check()
     except UnreadableMap:
         raise
-    except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, EOFError, gzip.BadGzipFile) as error:
-        raise Refused(f"the file is not as certificates are: {type(error).__name__}: {error}") from None
+    except _MALFORMED as error:
+        raise Refused("the file is not as certificates are, which `dubins_rrt certify` writes: "
+                      f"{type(error).__name__}: {str(error)[:200]}") from None
     return {name: document[name] for name in ("request", "length", "bound")}
+
+
+def _read(certificate: str | Path) -> bytes:
+    """Return the JSON of a certificate; the file may be a pipe or a device, and expand to more than there is memory for."""
+    descriptor = os.open(certificate, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to is not waited for
+    os.set_blocking(descriptor, True)
+    with open(descriptor, "rb") as file:
+        data = file.read(-1 if stat.S_ISREG(os.fstat(descriptor).st_mode) else MOST_BYTES)
+    text = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MOST_BYTES) if data[:2] == b"\x1f\x8b" else data
+    _demand(len(text) < MOST_BYTES, f"the file has {MOST_BYTES} bytes or more")
+    return text
+
+
+def _check_numbers(document: Any) -> None:
+    """Refuse a document of another version, and numbers with which an inequality would hold that says nothing."""
+    request, version = document["request"], document["certificate"]
+    _demand(version == VERSION and type(version) is int, f"it is of version {version!r:.50}; version {VERSION} can be checked")
+    sizes = ("turning_radius", "robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw")
+    numbers = {name: document[name] for name in ("length", "bound", "limit")} | {name: request[name] for name in sizes}
+    for name, number in numbers.items():
+        _demand(type(number) in (int, float), f"{name} is {number!r:.50}, which is no number")
+    _demand(type(document["map"]["allow_unknown"]) is bool, "allow_unknown is neither true nor false")
+    outline = request["footprint"]
+    _demand(not outline or shapely.is_valid(shapely.Polygon(outline)), "the footprint crosses itself")
 
 
 def _finite(number: str) -> float:
@@ -73,7 +106,7 @@ def _check_path(document: dict[str, Any], world: World) -> None:
     can = [word in TURNS and metres >= 0 and radius >= request["turning_radius"] * (1 - END) for word, radius, metres in path]
     _demand(all(can), "the path turns tighter than the vehicle can, or drives backwards")
     own = sum(metres for _, _, metres in path)
-    _demand(own <= length * (1 + MARGIN), f"the path is {own:.9g} m long")
+    _demand(abs(own - length) <= length * MARGIN, f"the path is {own:.9g} m long")
     outline = np.array(request["footprint"] or [(0, 0)], dtype=float)
     poses = _poses(world.own(request["start"]), path, float(np.hypot(*outline.T).max()))
     x, y, heading = poses[-1] - world.own(request["goal"])
@@ -99,6 +132,7 @@ def _poses(start: tuple[float, float, float], path: list[Any], reach: float) -> 
         turn = TURNS[word] * metres / radius
         # What is at `reach` drives on a circle of a radius of at most radius + reach.
         parts = max(1, math.ceil(abs(turn) * math.sqrt((radius + reach) / (8 * SAGITTA))))
+        _demand(parts + sum(map(len, poses)) <= MOST_POSES, "the path is too long to be looked at")
         share = np.arange(1, parts + 1) / parts
         chord, towards = metres * share * np.sinc(turn * share / math.tau), heading + turn * share / 2
         poses.append(np.column_stack([x + chord * np.cos(towards), y + chord * np.sin(towards), heading + turn * share]))
@@ -120,6 +154,8 @@ class _Bound:
     def check(self) -> None:
         """Raise Refused where something of the proof does not hold."""
         if not self._document["levels"]:
+            # Of a limit far below 0 the margin would excuse any bound.
+            _demand(self._document["limit"] >= max(0, self._bound), "the limit is below the bound")
             return self._check_edges({}, 0, {0}, math.inf)
         squares = self._squares = Squares(self._document)
         _demand(squares.side > 0, "the squares have no size")

@@ -2,9 +2,11 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from dubins_rrt_ros.checker.check import Refused, check
 from dubins_rrt_ros.checker.maps import UnreadableMap
+from dubins_rrt_ros.planning.text import quoted_name
 
 from .common.certificates import proved
 from .common.example import ENDS, MAP
@@ -32,8 +34,11 @@ def run(arguments: argparse.Namespace) -> int:
     except Refused as refusal:
         print(f"{arguments.certificate} does not hold: {refusal}", file=sys.stderr)
         return 1
-    except (UnreadableMap, OSError) as error:
+    except UnreadableMap as error:
         raise UsageError(str(error)) from None
+    except OSError as error:
+        file = error.filename if isinstance(error.filename, str | Path) else arguments.certificate  # of an open one a number
+        raise UsageError(f"{quoted_name(str(file))} cannot be read: {error.strerror}") from None
     request = claim["request"]
     vehicle = f"a footprint of {len(request['footprint'])} corners" if request["footprint"] else (
         f"a robot radius of {request['robot_radius']:g} m")

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import re
 
 import numpy as np
@@ -67,10 +68,47 @@ def test_another_map_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(("field", "value", "said"), [
-    ("length", 1.0, "the path is "), ("path", [], "beyond the goal's tolerance"),
+    ("length", 1.0, "the path is "), ("length", 1e3, "the path is "), ("length", None, "length is None, which is no number"),
+    ("bound", {}, "bound is {}, which is no number"), ("bound", True, "bound is True"), ("certificate", 2, "of version 2"),
+    ("certificate", True, "of version True"),
+    ("path", [], "the path is 0 m long"), ("path", [["L", 0.6, 1e13]], "the path is 1e+13 m long"),
     ("limit", 1.0, "the corridor is too narrow"), ("boxes", [], "the boxes do not fit")])
 def test_each_part_of_the_claim_is_looked_at(field, value, said, tmp_path):
     assert said in verdict(tmp_path, **{field: value})
+
+
+def test_a_path_that_ends_elsewhere_is_refused(tmp_path):
+    assert "beyond the goal's tolerance" in verdict(tmp_path, path=[], length=0.0)
+
+
+def test_a_limit_far_below_the_bound_makes_no_bound_true(tmp_path):
+    """The margin for rounding is a share of the limit: far below 0 it would excuse any bound."""
+    hitch = recorded("hitch")
+    for limit in (-1e15, 0.0):
+        document = hitch.document | {"limit": limit, "bound": 2 * hitch.document["length"]}
+        assert refusal(Certified(document, hitch.file), tmp_path) == "the limit is below the bound"
+
+
+def test_a_path_of_more_poses_than_there_is_memory_for_is_refused(tmp_path):
+    assert "too long to be looked at" in verdict(tmp_path, path=[["L", 0.6, 1e13]], length=1e13)
+
+
+def test_the_request_is_of_numbers_and_an_outline_that_does_not_cross_itself(tmp_path):
+    request = TURNED.document["request"]
+    crossing = [[1, 1], [1, -1], [-1, 1], [-1, -1]]
+    assert verdict(tmp_path, request=request | {"footprint": crossing}) == "the footprint crosses itself"
+    assert "goal_tolerance_xy is False" in verdict(tmp_path, request=request | {"goal_tolerance_xy": False})
+    assert "neither true nor false" in verdict(tmp_path, map=TURNED.document["map"] | {"allow_unknown": "no"})
+
+
+def test_a_pipe_without_a_writer_is_not_waited_for_and_what_expands_without_an_end_is_refused(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "long.cert").write_bytes(gzip.compress(b" " * 10_000))
+    monkeypatch.setattr("dubins_rrt_ros.checker.check.MOST_BYTES", 1000)
+    for file, said in ((tmp_path / "pipe", "as certificates are"), ("/dev/zero", "1000 bytes or more"),
+                       (tmp_path / "long.cert", "1000 bytes or more")):
+        with pytest.raises(Refused, match=said):
+            check(file, TURNED.file)
 
 
 def test_squares_and_a_vehicle_without_a_size_are_refused(tmp_path):
@@ -151,6 +189,8 @@ def test_cells_have_to_fit(cells, tmp_path):
         pytest.param(b"{\"map\": 1}", id="a map that is a number"),
         pytest.param(b"\x1f\x8bnothing", id="no gzip"),
         pytest.param(gzip.compress(b"{"), id="cut JSON in gzip"),
+        pytest.param(b"[" * 100_000, id="nested too deep"),
+        pytest.param(gzip.compress(b"{}" * 50)[:10] + b"\xff" * 50, id="no deflate"),
     ],
 )
 def test_what_is_no_certificate_is_refused(content, tmp_path):

@@ -61,3 +61,10 @@ def test_certify_offers_no_flags_that_would_fail():
         program.main(["certify", "--help"])
     assert "--gap" in out.getvalue()
     assert not any(flag in out.getvalue() for flag in ("--via", "--resolution", "--unknown-grey", "--start-slack"))
+
+
+@pytest.mark.parametrize(("certificate", "said"), [
+    ("nowhere.cert", "'nowhere.cert' cannot be read: No such file or directory"),
+    (".", "'.' cannot be read: Is a directory"), ("", "'' cannot be read: No such file or directory")])
+def test_a_certificate_that_cannot_be_read_is_named(certificate, said, capsys):
+    assert refusal("check", certificate, "maze", capsys=capsys) == f"dubins_rrt check: error: {said}\n"
