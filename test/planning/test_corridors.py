@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.planning import FREE, OCCUPIED, GridMap, Problem, Settings, Vehicle, plan
 from dubins_rrt_ros.planning._kernels import UNLIMITED
@@ -118,6 +119,7 @@ def test_no_place_is_closed_where_all_ways_lead_through_it(block):
     assert (detour is None) == (block[0] == 1)  # a block at the wall leaves but one way
 
 
+@needs_compiled
 def test_a_path_changes_its_corridor():
     """Of two ways to a goal behind a block, the one that the turn at the start leads to is the longer one."""
     problem = Problem(room_with((20, 40, 60, 80)), Vehicle(turning_radius=0.8), (1.0, 4.4, 1.5), (11.0, 4.0, -1.5))
@@ -125,6 +127,7 @@ def test_a_path_changes_its_corridor():
     assert max(lengths) < 1.003 * min(lengths)
 
 
+@needs_compiled
 def test_the_same_seed_gives_the_same_path_through_corridors():
     problem = Problem(room_with(BLOCK, (30, 90, 50, 100)), Vehicle(turning_radius=0.6), START, GOAL)
     first, second = (plan(problem, Settings(samples=1500, planning_time=60, seed=4)) for _ in range(2))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.cases import scaled
 
 from dubins_rrt_ros.planning import FREE, OCCUPIED, GridMap, Problem, Settings, Vehicle, plan
 from dubins_rrt_ros.planning.collision.clearance import ClearanceField
@@ -20,6 +21,7 @@ ROOM = GridMap(CELLS, 0.05)
 FIELD = ClearanceField(ROOM)
 START = (2.0, 2.0, 0.0)
 VEHICLE = Vehicle(turning_radius=1.0, robot_radius=0.2)
+SAMPLES = scaled(600, least=60)
 NEAR_WALL = (8.0, 4.68, 0.0)  # it lacks 2 cm
 
 
@@ -30,7 +32,7 @@ def goals_of(y: float, start: tuple[float, float, float] = START, room: GridMap 
 
 def ends_off(problem: Problem, settings: Settings | None = None) -> float:
     """Return how far from the goal a path ends [m]."""
-    answer = plan(problem, settings or Settings(samples=600, planning_time=60, seed=1))
+    answer = plan(problem, settings or Settings(samples=SAMPLES, planning_time=60, seed=1))
     answer.check()
     assert answer.path is not None, answer.message
     return math.dist(answer.path.end[:2], problem.goal[:2])
@@ -81,7 +83,7 @@ def test_hybrid_astar_finds_the_path_to_a_goal_too_near_a_wall(heading):
 
 @pytest.mark.parametrize("planner", ["rrt", "rrt_star"])
 def test_a_path_ends_as_near_to_the_goal_as_a_free_pose_is(planner):
-    settings = Settings(planner=planner, samples=600, planning_time=60, seed=1)
+    settings = Settings(planner=planner, samples=SAMPLES, planning_time=60, seed=1)
     near_wall = Problem(ROOM, VEHICLE, START, NEAR_WALL, goal_tolerance_xy=0.3)
     assert 0.02 <= ends_off(near_wall, settings) < 0.021
     assert ends_off(replace(near_wall, goal=(8.0, 6.0, 1.0)), settings) == 0
@@ -102,8 +104,8 @@ def test_plain_algorithms_end_anywhere_within_the_tolerance():
 
 def test_a_seed_path_to_the_edge_of_the_tolerance_is_led_on():
     problem = Problem(ROOM, VEHICLE, START, (8.0, 2.0, 0.0), goal_tolerance_xy=0.3)
-    curve = dubins.shortest(START, (7.8, 2.0, 0.0), 1.0)
-    answer = plan(problem, Settings(samples=1, seed=1), seed_path=Path.of_curves(START, (7.8, 2.0, 0.0), [curve]))
+    known = Path.of_curves(START, (7.8, 2.0, 0.0), [dubins.shortest(START, (7.8, 2.0, 0.0), 1.0)])
+    answer = plan(problem, Settings(samples=1, planning_time=60, seed=1), seed_path=known)
     assert answer.found_by == "seed_path"
     assert answer.path.end == problem.goal
 
@@ -133,5 +135,5 @@ def test_a_free_heading_is_that_of_an_arc_and_a_straight_where_others_need_a_loo
     """Of 16 headings none is near enough to that in which a goal a little aside is reached without turning all the way round."""
     problem = Problem(ROOM, Vehicle(turning_radius, 0.2), START, (8.0, 2.001, 0.0), any_goal_heading=True)
     for seed in range(3):
-        answer = plan(problem, Settings(samples=10, seed=seed))
+        answer = plan(problem, Settings(samples=10, planning_time=60, seed=seed))
         assert answer.length == pytest.approx(6.0, abs=1e-3)

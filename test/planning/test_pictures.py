@@ -11,11 +11,14 @@ import matplotlib.pyplot
 import numpy as np
 import pytest
 from PIL import Image
-from support.cases import empty_map
+from support.cases import empty_map, needs_compiled
 
 from dubins_rrt_ros.planning import GridMap, PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
 from dubins_rrt_ros.planning.pictures.animation import Recording, _SearchScreen, save_drive
+
+#: What is drawn of a path does not depend on the kernels that found it.
+pytestmark = needs_compiled
 
 EVERY, SAMPLES = 7, 60
 

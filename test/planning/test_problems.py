@@ -13,7 +13,7 @@ POSSIBLE = {Status.NONE, Status.START_OCCUPIED, Status.GOAL_OCCUPIED, Status.TIM
 #: Number of problems of each algorithm.
 COUNT = scaled(100, least=15)
 #: A search without a path goes on until this [s].
-PATIENCE = 0.15 if SCALE == 1 else 20.0
+PATIENCE = 0.15 if SCALE == 1 else 8.0
 
 
 @pytest.mark.parametrize(("planner", "count"), [
