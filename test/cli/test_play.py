@@ -203,10 +203,16 @@ def test_where_there_is_no_path_the_reason_and_its_place_are_told(server):
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 2, NaN]}', "goal pose"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "vehicle": {"wings": 2}}', "wings"),
     ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "settings": {"samples": -1}}', "samples"),
-    ('{"type": "draw", "points": [], "radius": 1, "obstacle": true}', ""), ('{"type": "draw"}', "points"),
+    ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "vehicle": [2]}', "vehicle is [2]; give an object of options"),
+    ('{"type": "plan", "start": [1, 2, 0], "goal": [1, 3, 0], "via": 5}', "the waypoints are 5"),
+    ('{"type": "draw", "points": [], "radius": 1, "obstacle": true}', "has points and a radius"), ('{"type": "draw"}', "points"),
+    ('{"type": "draw", "points": [[1, 1]], "radius": -1, "obstacle": true}', "has points and a radius"),
+    ('{"type": "draw", "points": [[1, 1]], "radius": 1e999, "obstacle": true}', "has points and a radius"),
+    ('{"type": "draw", "points": [[1e300, 1]], "radius": 1, "obstacle": true}', "has points and a radius"),
+    ('{"type": "load", "name": "../maze.yaml"}', "'../maze.yaml' is outside of "),
     (f'{{"type": "draw", "points": [[1{"0" * 400}, 1]], "radius": 1, "obstacle": true}}', "too large"),
     (f'{{"type": "plan", "start": [1{"0" * 400}, 2, 0], "goal": [1, 3, 0]}}', "start pose"),
-    ('{"type": "draw", "points": [[NaN, 1]], "radius": 1, "obstacle": true}', ""),
+    ('{"type": "draw", "points": [[NaN, 1]], "radius": 1, "obstacle": true}', "has points and a radius"),
     ('{"type": "load", "name": "nowhere.yaml"}', "nowhere.yaml"), ('{"type": "copy"}', "no answer")])
 def test_what_cannot_be_done_is_refused_in_a_sentence_and_the_next_is_served(server, text, words):
     async def bad(page):

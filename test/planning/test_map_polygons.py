@@ -109,6 +109,24 @@ def test_bad_feature(second, words):
     check_refusal(collection(BOUNDS, second), words)
 
 
+@pytest.mark.parametrize(("meant", "said"), [
+    (feature([SQUARE], role="Bounds", name="yard"), "(feature 1 ('yard') has 'role': 'Bounds')"),
+    (feature([SQUARE], Role="boundary"), "(feature 1 has 'Role': 'boundary')"),
+    ({**feature([SQUARE]), "role": "bounds"}, "(feature 1 has 'role': 'bounds')"), (feature([SQUARE]), "(none)")])
+def test_bounds_that_were_marked_otherwise_are_named(meant, said):
+    check_refusal(collection(meant, feature([POST])), ["0 features", said])
+
+
+@pytest.mark.parametrize(("crs", "said"), [
+    ("EPSG:4326", "are degrees"), ({"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}, "are degrees"),
+    ("EPSG:3857", "1 / cos(latitude)"), ({"properties": {"name": "urn:ogc:def:crs:EPSG::900913"}}, "1 / cos(latitude)"),
+    ("EPSG:32632", ""), ({"properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}, ""), (None, ""), (4326, "")])
+def test_a_crs_that_is_not_in_metres_is_doubted(crs, said):
+    document = {"type": "FeatureCollection", "crs": crs, "features": [BOUNDS]}
+    warnings = parse_geojson(json.dumps(document), "yard.geojson").warnings
+    assert len(warnings) == bool(said) and said in "".join(warnings)
+
+
 def check_refusal(text, words):
     with pytest.raises(MapError) as caught:
         parse_geojson(text, "bad.geojson")

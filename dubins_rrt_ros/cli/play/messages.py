@@ -13,7 +13,8 @@ from PIL import Image
 
 from dubins_rrt_ros.planning import GridMap, Map, Plan, Pose, Problem, Settings, Vehicle, checked_pose, options, values
 from dubins_rrt_ros.planning.option import Option, OptionError
-from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
+from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoints
+from dubins_rrt_ros.planning.text import quoted
 
 from ..common.example import GOAL, START
 from ..common.flags import flag
@@ -54,18 +55,20 @@ def read_request(document: Mapping[str, Any]) -> PlanRequest:
     Raises:
         InvalidPose, OptionError: a pose is none, or an option is unknown or out of range.
     """
-    vehicle = Vehicle(**_known(Vehicle, document.get("vehicle")))
-    settings = Settings(**_known(Settings, document.get("settings")))
-    problem = _known(Problem, document.get("problem"))
+    vehicle, settings = Vehicle(**_known(Vehicle, document)), Settings(**_known(Settings, document))
+    problem = _known(Problem, document)
     number = document.get("id")
     start, goal = (checked_pose(name, document.get(name, ())) for name in ("start", "goal"))
-    via = tuple(checked_waypoint(f"waypoint {count}", pose) for count, pose in enumerate(document.get("via", ()), 1))
+    via = checked_waypoints(document.get("via", ()))
     return PlanRequest(number if isinstance(number, int) else 0, start, goal, via, vehicle, settings, problem,
                        document.get("quick") is True)
 
 
-def _known(cls: type, given: Any) -> dict[str, Any]:
-    given = dict(given) if isinstance(given, Mapping) else {}
+def _known(cls: type, document: Mapping[str, Any]) -> dict[str, Any]:
+    name = cls.__name__.lower()
+    given = document.get(name, {})
+    if not isinstance(given, dict):
+        raise OptionError(f"{name} is {quoted(given)}; give an object of options")
     names = {item.name for item in options(cls)}
     if unknown := sorted(map(str, given.keys() - names)):
         raise OptionError(f"there is no option {unknown[0]}")

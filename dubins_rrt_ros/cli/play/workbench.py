@@ -11,10 +11,12 @@ import shapely
 
 from dubins_rrt_ros.planning import GridMap, Map, MapError, PolygonMap, Vehicle, World, load_map, prepare, save_map
 from dubins_rrt_ros.planning.maps.cells import FREE, OCCUPIED
+from dubins_rrt_ros.planning.maps.free_space import MAX_COORDINATE
 from dubins_rrt_ros.planning.maps.grids import PICTURE_ENDINGS
 from dubins_rrt_ros.planning.maps.locate import find_map, installed_maps
 from dubins_rrt_ros.planning.maps.opening import check_inside
 from dubins_rrt_ros.planning.maps.readers import MAP_ENDINGS, OTHER_ENDINGS
+from dubins_rrt_ros.planning.text import quoted_name
 
 #: Maximum size of a map file that is read or written [bytes], and maximum number of cells of a grid.
 MAX_BYTES = 64 * 2**20
@@ -80,7 +82,7 @@ class Workbench:
         if isinstance(self.map, GridMap):
             if ending != ".yaml":
                 raise MapError(f"{name}: a grid is saved as .yaml with its image; let the name end with .yaml")
-            check_inside(file.with_suffix(".pgm"), self.folder)
+            self._inside(str(Path(name).with_suffix(".pgm")))
             if self.map.data.size > MAX_BYTES:
                 raise MapError(f"{name} would be larger than {MAX_BYTES >> 20} MB")
             save_map(self.map, file)
@@ -105,15 +107,20 @@ class Workbench:
         if not name or "\0" in name:
             raise MapError("the name of the map is empty, or none")
         file = Path(self.folder, name)
-        check_inside(file, self.folder)
+        try:
+            check_inside(file, self.folder)
+        except MapError:
+            raise MapError(f"{quoted_name(name)} is outside of {self.folder}; name a file in there or below") from None
         return file
 
     def draw(self, points: list[tuple[float, float]], radius: float, is_obstacle: bool) -> None:
         """Draw, or erase, what lies within a radius of a line through points [m].
 
         Raises:
-            MapError: it would leave no free space.
+            MapError: it would leave no free space, or has no points, or numbers that are none on a map.
         """
+        if not points or radius < 0 or not (np.abs([*points, (radius, 0.0)]) <= MAX_COORDINATE).all():
+            raise MapError(f"what is drawn has points and a radius in metres, up to {MAX_COORDINATE:g}")
         line = shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0])
         drawn = self._draw_cells if isinstance(self.map, GridMap) else self._draw_polygons
         drawn(line, radius, is_obstacle)

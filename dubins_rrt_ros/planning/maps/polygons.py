@@ -17,8 +17,10 @@ from .model import PolygonMap
 #: Size of a map below which its coordinates may be degrees, and how many times further from (0, 0) it is then, at least.
 _SIZE_IN_DEGREES, _TIMES_FURTHER = 0.5, 20
 _POLYGONS = ("Polygon", "MultiPolygon")
-#: The names of coordinate reference systems in degrees that drawing programs write.
-_CRS_IN_DEGREES = re.compile(r"\b(CRS:?84|EPSG:.*\b4326)\b", re.IGNORECASE)
+#: The names of coordinate reference systems that drawing programs write: what is odd about coordinates in them.
+_ODD_CRS = {re.compile(rf"\b({names})\b", re.IGNORECASE): odd for names, odd in (
+    (r"CRS:?84|EPSG:.*\b4326", "whose coordinates are degrees"),
+    (r"EPSG:.*\b(3857|3785|900913)", "in which a metre on the ground is 1 / cos(latitude) long"))}
 
 
 def parse_geojson(text: str, name: str) -> PolygonMap:
@@ -26,7 +28,7 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
 
     The one feature with the property `"role": "bounds"` is the bounds, every other an obstacle; a hole of an obstacle
     is free. A lone Feature is a collection of one. Members that GeoJSON does not define are ignored. Coordinates
-    that look like degrees are refused; obstacles outside of the bounds and a crs in degrees are doubted.
+    that look like degrees are refused; obstacles outside of the bounds and a crs that is not in metres are doubted.
 
     Raises:
         MapError: the text is no such collection, or a ring is not valid; names the feature and the ring.
@@ -40,7 +42,7 @@ def parse_geojson(text: str, name: str) -> PolygonMap:
         is_bounds = _properties(feature).get("role") == "bounds"
         (bounds if is_bounds else obstacles).append((label, geometry))
     if len(bounds) != 1:
-        found = ", ".join(label for label, _ in bounds[:5]) or "none"
+        found = ", ".join(label for label, _ in bounds[:5]) or _likely_bounds(document) or "none"
         raise MapError(f'{len(bounds)} features have the property "role": "bounds" ({found}); mark exactly one so')
     _refuse_degrees(bounds[0][1], bounds[0][0])
     labels, shapes = [label for label, _ in obstacles], [geometry for _, geometry in obstacles]
@@ -89,14 +91,22 @@ def _refuse_degrees(bounds: shapely.Geometry, label: str) -> None:
                        f"{(south + north) / 2:.6g}): these look like degrees; give metres, as of a projection such as UTM")
 
 
+def _likely_bounds(document: Any) -> str:
+    """Return which feature was likely meant as the bounds and what it has, in words; "" where there is none."""
+    for number, feature in enumerate(_features(document), 1):
+        for key, value in {**feature, **_properties(feature)}.items():
+            if key != "properties" and (key.strip().lower() == "role" or "bound" in f"{key} {value}".lower()):
+                return f"{_label(number, feature)} has {quoted(key)}: {quoted(value)}"
+    return ""
+
+
 def _doubt_about_crs(document: Any) -> str:
-    """Return that the file calls its coordinates degrees, in words; "" where it does not."""
+    """Return that the coordinates are no metres by what the file says of them, in words; "" where it does not."""
     crs = document.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
-    name = properties.get("name") if isinstance(properties, dict) else None
-    if not (isinstance(name, str) and _CRS_IN_DEGREES.search(name)):
-        return ""
-    return f"its crs is {quoted(name)}, whose coordinates are degrees, and they are taken as metres; leave crs out if they are"
+    name = properties.get("name") if isinstance(properties, dict) else crs
+    odd = [words for pattern, words in _ODD_CRS.items() if isinstance(name, str) and pattern.search(name)]
+    return f"its crs is {quoted(name)}, {odd[0]}, and they are taken as metres; leave crs out if they are" if odd else ""
 
 
 def _parse_json(text: str) -> Any:
