@@ -173,6 +173,10 @@ def test_in_a_browser_a_drag_sends_the_goal_and_the_path_appears(watched):
         wait.until(lambda _: browser.execute_script("return window.dubins?.view.map !== null"))
         assert not browser.find_element(By.CSS_SELECTOR, "[data-tool=draw]").is_displayed()
         assert browser.find_element(By.ID, "cancel").is_displayed()
+        low, high, start, goal, unsent = browser.execute_script(
+            "const v = window.dubins.view; return [v.map.low, v.map.high, v.start, v.goal, [...v.unsent]]")
+        assert unsent == ["start", "goal"] and start != goal, "to be taken hold of, before any is sent"
+        assert all(low[axis] < pose[axis] < high[axis] for pose in (start, goal) for axis in (0, 1))
         drag = """
             const v = window.dubins.view, c = v.canvas, b = c.getBoundingClientRect();
             const fire = (kind, x, y) => { const [a, d] = v.toScreen(x, y); c.dispatchEvent(new PointerEvent(kind,
@@ -187,5 +191,6 @@ def test_in_a_browser_a_drag_sends_the_goal_and_the_path_appears(watched):
             "const a = window.dubins.view.answer; return a && a.poses.length > 0 && Math.abs(a.poses.at(-1)[0] - 8.0) < 0.1"))
         wait.until(lambda _: browser.find_element(By.ID, "title").text.startswith("Path of"))
         assert browser.execute_script("return window.dubins.view.tree.length") > 50
+        wait.until(lambda _: browser.execute_script("return window.dubins.view.unsent.size") == 0)
     finally:
         browser.quit()

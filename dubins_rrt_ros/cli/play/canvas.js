@@ -13,6 +13,7 @@ export class View {
     this.start = [0, 0, 0];
     this.goal = [0, 0, 0];
     this.via = [];
+    this.unsent = new Set();  // those of start and goal that a watched node knows nothing of
     this.selected = "goal";
     this.answer = null;
     this.first = null;
@@ -235,6 +236,7 @@ export class View {
 
   drawPose(pose, colour, name) {
     const { context, pixel } = this, tip = this.toWorld(...this.tip(pose));
+    context.globalAlpha = this.unsent.has(name) ? 0.45 : 1;
     this.outline(pose);
     context.fillStyle = colour + "50";
     context.fill();
@@ -253,6 +255,7 @@ export class View {
       context.stroke();
     }
     this.write(name, pose[0], pose[1], colour);
+    context.globalAlpha = 1;
   }
 
   write(text, x, y, colour) {

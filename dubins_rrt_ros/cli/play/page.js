@@ -65,6 +65,7 @@ const receivers = {
     options = message.options;
     isWatching = message.watch === true;
     document.body.classList.toggle("watching", isWatching);
+    if (isWatching && !view.map) { view.unsent = new Set(["start", "goal"]); }
     document.title = `dubins_rrt ${isWatching ? "watch" : "play"}`;
     $("command").textContent = document.title;
     if (isWatching) { options.settings = [...options.vehicle, ...options.settings]; changed = {}; }
@@ -72,12 +73,16 @@ const receivers = {
     makeSettings();
   },
   map(message) {
-    const known = recall();
+    const known = recall(), isFirst = view.map === null;
     view.setMap(message);
     view.stroke = null;
     $("title").textContent = message.name;
+    if (isWatching) {
+      for (const name of view.unsent) { view[name] = message[name]; }
+      if (isFirst || message.new) { view.fit(); }
+      return;
+    }
     if (message.new) {
-      if (isWatching) { view.fit(); return; }
       [view.start, view.goal] = known && known.map === message.name ? [known.start, known.goal] : [message.start, message.goal];
       view.via = known && known.map === message.name && known.via ? known.via : [];
       view.answer = view.first = view.tree = null;
@@ -105,7 +110,10 @@ const receivers = {
   },
   poses(message) {
     if (held) { return; }
-    for (const name of ["start", "goal"]) { view[name] = message[name] || view[name]; }
+    for (const name of ["start", "goal"].filter((name) => message[name])) {
+      view[name] = message[name];
+      view.unsent.delete(name);
+    }
     const via = JSON.stringify(message.via);  // what was added on the page stays until a goal with others comes
     if (via !== lastVia) { lastVia = via; view.via = message.via; }
     view.request();
