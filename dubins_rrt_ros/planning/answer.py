@@ -71,13 +71,18 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     so_far = " so far" if running else ""
     above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved and not problem.is_free else "")
     found = f", found by {ALGORITHMS[answer.found_by]}" if answer.found_by else ""
-    drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample"
-    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {'cancelled ' if cancelled else ''}{drawn} in {elapsed:.3g} s"
+    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {'cancelled ' if cancelled else ''}{effort(samples, elapsed)}"
     if problem.vehicle.required_clearance < 0:
         message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
     if problem.is_free:
         message += f"; is_free was asked every {problem.fine_spacing:g} m along it, and not between"
     return f"{message}{end_clause(problem, path)}."
+
+
+def effort(samples: int, elapsed: float) -> str:
+    """Return after how many samples and in what time [s] a path was found, as a clause."""
+    drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample,"
+    return f"{drawn} in {elapsed:.3g} s"
 
 
 def end_clause(problem: Problem, path: Path) -> str:

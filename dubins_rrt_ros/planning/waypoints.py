@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .answer import defect_message, end_clause, not_audited_message
+from .answer import defect_message, effort, end_clause, not_audited_message
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
 from .curves.angles import wrap
@@ -256,8 +256,8 @@ class _Call:
         if self._time_to_first is None:
             self._time_to_first = self._clock.elapsed
         count = len(self._waypoints)
-        message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, after {self._samples} "
-                   f"sample{'' if self._samples == 1 else 's'} in {self._clock.elapsed:.3g} s{end_clause(self._problem, path)}.")
+        message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, "
+                   f"{effort(self._samples, self._clock.elapsed)}{end_clause(self._problem, path)}.")
         bound = min(least_length(self._problem, self._waypoints, self._proved), path.length)
         answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
                             cost=float(tree.costs[-1]), cost_lower_bound=bound,
