@@ -62,6 +62,22 @@ def test_away_from_a_wall_the_cost_is_the_integral(kind):
     assert roomy_share_of(path, problem, SETTINGS) == pytest.approx(1 - 0.8 * reach / 16, abs=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["grid", "polygons"])
+@pytest.mark.parametrize("radius", [0.02, 0.5])
+def test_where_a_footprint_turns_nearly_on_the_spot_the_cost_is_the_integral_of_how_its_corners_move(kind, radius):
+    world_map, vehicle = hall(kind), Vehicle(radius, footprint=CAR.footprint)
+    curve = DubinsCurve(pose_in(world_map, 6.0, 1.1, 0.3), radius, "LSL", (0.9 * radius, 0.0, 0.0))
+    path = Path.of_curves(curve.start, curve.end, [curve])
+    turns = 0.3 + 0.9 * (np.arange(100_000) + 0.5) / 100_000
+    y = 1.1 + radius * (math.cos(0.3) - np.cos(turns))
+    corners = np.array(vehicle.footprint)
+    room = (y + (np.sin(turns) * corners[:, :1] + np.cos(turns) * corners[:, 1:]).min(axis=0)) - 0.4
+    assert 0 < room.min() < PREFERRED
+    closeness = float((np.maximum(0, 1 - room / PREFERRED)**2).mean())
+    problem = Problem(world_map, vehicle, path.start, path.end)
+    assert cost_of(path, problem, SETTINGS) == pytest.approx(path.length * (1 + WEIGHT * closeness), rel=1e-4)
+
+
 @pytest.mark.parametrize("length", [0.7, 58.0])
 def test_the_cost_of_cells_is_their_integral_along_the_path(length):
     rng = np.random.default_rng(1)

@@ -10,13 +10,13 @@ from ..maps.model import GridMap
 from ..problem import Problem
 from ..settings import ROOMY, Settings
 from .obstacles import Obstacles, PathsideSquares, PolygonObstacles, obstacles_of
-from .sweep import Arcs, DiscSweep, PolygonSweep, any_time
+from .sweep import Arcs, DiscSweep, PolygonSweep, any_time, fastest
 from .verdict import driven_arcs
 
 if TYPE_CHECKING:
     from ..curves.path import Path
 
-#: Distance between the points, in preferred clearances, and their maximum number.
+#: Way of the vehicle's fastest point from one of the points to the next, in preferred clearances, and their maximum number.
 SPACING, MOST_POINTS = 1 / 64, 1_000_000
 #: Size of the pieces that a path over cells with costs is cut into, in cells, and number of parts of one that leaves its cell.
 CELL_PIECE, CELL_PARTS = 1 / 8, 64
@@ -77,7 +77,10 @@ def _closeness(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacl
 def _rooms(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: Obstacles | None, check_time: Callable[[], None]
            ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the sizes of pieces of the arcs [m], and the room in their middles, as far as that is below the preferred one [m]."""
-    index, begin, size = arcs.pieces(max(SPACING * preferred_clearance, float(arcs.length.sum()) / MOST_POINTS))
+    corners = np.array([complex(*corner) for corner in problem.vehicle.footprint or ((0.0, 0.0),)])
+    speed = fastest(corners, arcs.curvature)
+    longest = max(SPACING * preferred_clearance, float((arcs.length * speed).sum()) / MOST_POINTS)
+    index, begin, size = arcs.pieces(longest / speed)
     x, y, theta = arcs.at(index, begin + size / 2)
     vehicle, inset = _vehicle(problem, preferred_clearance, obstacles, arcs, check_time)
     for first in range(0, len(x), AT_ONCE):

@@ -70,8 +70,12 @@ class Arcs:
         direction = self.theta[index] + half
         return self.x[index] + chord * np.cos(direction), self.y[index] + chord * np.sin(direction), self.theta[index] + 2 * half
 
-    def pieces(self, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Cut each arc into pieces of one size, at most `longest`; return the indices of their arcs, their begins and sizes."""
+    def pieces(self, longest: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cut each arc into pieces of one size; return the indices of their arcs, their begins and sizes.
+
+        Args:
+            longest: maximum size of the pieces [m], of all arcs or of each.
+        """
         count = np.maximum(np.ceil(self.length / longest), 1).astype(int)
         index, nth = _counted(count)
         size = (self.length / count)[index]
@@ -216,6 +220,11 @@ class DiscSweep:
         return PolygonSweep(((0.0, 0.0),), obstacles).bound(arcs, pieces, enough)
 
 
+def fastest(corners: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+    """Return (n,) the speeds of the fastest of a polygon's corners x + iy on arcs, in metres per metre along them."""
+    return np.asarray(np.abs(1 + 1j * np.outer(curvature, corners)).max(axis=1))
+
+
 class PolygonSweep:
     """A vehicle that is a polygon; its corners are x + iy here, and turned by a complex factor.
 
@@ -236,8 +245,7 @@ class PolygonSweep:
         """Return lower bounds of the clearance on pieces; those above `enough` [m] need not be close."""
         curvature = arcs.curvature[pieces.index]
         # A circle's arc that turns by an angle a has the sagitta r (1 - cos(a / 2)), which is at most r a^2 / 8.
-        speed: np.ndarray = np.abs(1 + 1j * np.outer(curvature, self._corners)).max(axis=1)
-        sagitta = speed * np.abs(curvature) * pieces.size**2 / 8
+        sagitta: np.ndarray = fastest(self._corners, curvature) * np.abs(curvature) * pieces.size**2 / 8
         reach = enough + float(sagitta.max(initial=0.0)) + CONTACT  # so that rounding leaves more than enough
         bounds = self._swept(arcs, pieces, self._corners, reach) - sagitta
         low = np.flatnonzero(bounds < enough) if len(self._corners) > 1 else np.empty(0, int)
