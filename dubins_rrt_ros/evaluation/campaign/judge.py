@@ -288,7 +288,7 @@ def _check_curve(problem: Problem, curve: DubinsCurve) -> Iterator[str]:
 
 def _check_repetition(trial: Trial, answer: Plan) -> Iterator[str]:
     """Yield what differs if the same request is made again, and does the same work, whatever time it takes."""
-    if answer.path:
+    if answer.work:
         settings = repeating(trial.settings, answer.work)
     elif trial.settings.planning_time >= AMPLE_TIME and answer.status != Status.TIMEOUT:
         settings = trial.settings
