@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from support.cases import needs_compiled
+from support.cases import needs_compiled, scaled
 
 from dubins_rrt_ros.evaluation.families.buildings import building
 from dubins_rrt_ros.planning import (
@@ -35,7 +35,7 @@ from dubins_rrt_ros.planning.deadline import OutOfTime, never
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
 CAR = Vehicle.from_footprint([(0.32, 0.36), (-0.48, 0.36), (-0.48, -0.36), (0.32, -0.36)], turning_radius=0.4)
-SETTINGS = Settings(samples=100, planning_time=60.0, seed=1)
+SETTINGS = Settings(samples=scaled(100, least=20), planning_time=60.0, seed=1)
 GOAL = (8.0, 4.0, 0.0)
 
 
