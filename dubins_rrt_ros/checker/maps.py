@@ -15,7 +15,7 @@ from PIL import Image
 FREE_UP_TO, OCCUPIED_FROM, UNKNOWN = 25, 65, -1
 
 
-class UnreadableMap(ValueError):
+class UnreadableMap(Exception):
     """A map that the checker cannot read."""
 
 
@@ -98,7 +98,7 @@ def _pixels(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return brightness (0 to 255) and transparency of the pixels of an image."""
     with Image.open(path) as image:
         if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
-            raise UnreadableMap(f"{path} has pixels of the mode {image.mode}; save it with 8 bits")
+            raise ValueError(f"{path.name} has pixels of the mode {image.mode}; save it with 8 bits")
         clear = np.asarray(image.convert("RGBA").getchannel("A")) < 255
         return np.asarray((image.convert("RGBA") if image.mode == "P" else image).convert("L"), dtype=np.int32), clear
 
@@ -109,7 +109,7 @@ def _occupancies(grey: np.ndarray, clear: np.ndarray, mode: str, negate: bool, o
     if mode == "raw":
         return np.where(grey <= 100, grey, UNKNOWN)
     if mode not in ("trinary", "scale"):
-        raise UnreadableMap(f"the mode {mode} is not known")
+        raise ValueError(f"the mode {mode} is not known")
     shade = grey.astype(np.float32) / np.float32(255)
     dark, low, high = shade if negate else 1 - shade, np.float32(free_thresh), np.float32(occupied_thresh)
     between = np.floor((dark - low) / np.float32(occupied_thresh - free_thresh) * np.float32(100) + 0.5)
@@ -136,13 +136,13 @@ def _free_space(path: Path) -> shapely.Geometry:
         is_bounds = (feature.get("properties") or {}).get("role") == "bounds"
         shapes[is_bounds].append(shapely.force_2d(shapely.from_geojson(json.dumps(feature["geometry"]))))
     if len(shapes[True]) != 1:
-        raise UnreadableMap(f"{path} has not one feature with the role bounds")
+        raise ValueError("it has not one feature with the role bounds")
     return shapely.difference(shapes[True][0], shapely.union_all(shapes[False]))
 
 
 def _polygons(free: shapely.Geometry) -> World:
     if not shapely.is_valid(free) or shapely.is_empty(free) or shapely.get_type_id(free) not in (3, 6):
-        raise UnreadableMap("the free space is no valid polygon")
+        raise ValueError("the free space is no valid polygon")
     ends, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(free)), return_index=True)
     edges = shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)[ring[:-1] == ring[1:]])
     shapely.prepare(free)
