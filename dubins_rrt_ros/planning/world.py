@@ -8,7 +8,6 @@ import numpy as np
 
 from .audit.obstacles import Obstacles, obstacles_of
 from .collision.clearance import ClearanceField
-from .collision.footprint import cover
 from .collision.own_test import OwnTest
 from .maps.model import GridMap, Map, PolygonMap
 from .problem import Problem
@@ -110,7 +109,7 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
     world.field.components(vehicle.required_clearance)
     world.field.free_squares(vehicle.required_clearance)
     if vehicle.footprint:
-        cover(vehicle.footprint)
+        world.field.room(vehicle)
     world.obstacles  # noqa: B018 - computed now
     return world
 

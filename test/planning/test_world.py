@@ -162,6 +162,16 @@ def test_two_vehicles_on_one_map_prepare_once_each(monkeypatch):
     assert_same(small, prepare(small.map, SMALL))
 
 
+@pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
+def test_what_the_room_of_a_footprint_needs_is_prepared(make, monkeypatch):
+    """On a map of nine million cells it took 0.14 s of a request for 0.05 s."""
+    calls = counted(monkeypatch, "CornerIndex")
+    world = world_of(make, Vehicle(0.5, footprint=((0.2, -0.1), (0.2, 0.1), (-0.1, 0.1), (-0.1, -0.1))))
+    assert calls == {"CornerIndex": 1}
+    plan(problem_in(world), replace(QUICK, preferred_clearance=0.2))
+    assert calls == {"CornerIndex": 1}
+
+
 def test_a_vehicle_that_takes_as_much_room_shares_all(monkeypatch):
     small = world_of()
     calls = counted(monkeypatch, "grid_clearance", "free_squares")

@@ -159,7 +159,8 @@ def grid_corners(blocked: np.ndarray, cell: float) -> np.ndarray:
     low, high = padded[:-1], padded[1:]
     a, b, c, d = low[:, :-1], low[:, 1:], high[:, :-1], high[:, 1:]
     sticks_out = ((a | d) & ~b & ~c) | ((b | c) & ~a & ~d)
-    return np.argwhere(sticks_out)[:, ::-1] * cell
+    row, column = np.divmod(np.flatnonzero(sticks_out), sticks_out.shape[1])
+    return np.column_stack([column, row]) * cell
 
 
 def polygon_clearance(polygons: PolygonMap) -> PolygonClearance:

@@ -106,7 +106,7 @@ def nearest_obstacle(world_map: Map, allow_unknown: bool, point: Point, clearanc
 
 def _nearest_cell(grid: GridMap, allow_unknown: bool, point: Point) -> Obstacle | None:
     """Return the nearest of the squares of the blocked cells, if there are any."""
-    rows, columns = np.nonzero(grid.blocked(allow_unknown))
+    rows, columns = np.divmod(np.flatnonzero(grid.blocked(allow_unknown)), grid.data.shape[1])
     if len(rows) == 0:
         return None
     here = grid.to_grid_frame(np.array(point))
