@@ -54,6 +54,15 @@ def test_a_path_ends_at_the_goal_in_place_and_heading(change, said, tmp_path):
     assert said in verdict(document, file, tmp_path) and bool(said) == bool(verdict(document, file, tmp_path))
 
 
+def test_a_bound_keeps_a_margin_for_rounding(tmp_path):
+    file = room(tmp_path)
+    document = claim(file, (0.3, 0.3, 0.0), [["S", 0.2, 0.5]])
+    for above, said in ((-1e-7, ""), (3e-12, "higher than those before it allow")):
+        bound = document["length"] + above
+        found = verdict(document | {"bound": bound, "limit": max(bound, document["length"])}, file, tmp_path)
+        assert said in found and bool(said) == bool(found)
+
+
 def test_poses_have_three_numbers(tmp_path):
     file = room(tmp_path)
     document = claim(file, (0.3, 0.3, 0.2), BEND)
