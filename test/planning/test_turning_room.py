@@ -79,6 +79,16 @@ def test_what_drives_away_can_leave():
     assert free > 2 and proofs > 2
 
 
+def test_from_a_free_start_a_path_leads_whatever_the_last_bit_of_the_turning_radius():
+    """Of some radii the square is less than their product with themselves: one of 2,200 had no path on any map."""
+    grid = GridMap(np.zeros((60, 60)), 1.0)
+    field = ClearanceField(grid)
+    radii = [radius for radius in np.random.default_rng(0).uniform(0.05, 5.0, 20_000).tolist() if radius**2 < radius * radius]
+    for radius in (0.07282727487922586, *radii):
+        problem = Problem(grid, Vehicle(radius, 0.02), (30.0, 30.0, 0.0), (50.0, 50.0, 0.0))
+        assert not cannot_leave(problem, field, problem.start), radius
+
+
 def test_too_little_room_to_turn_round():
     """In a corridor from which both ends lead on; a place that is wide enough makes it no reason."""
     data = np.full((60, 400), 100, np.int8)

@@ -32,7 +32,9 @@ def cannot_leave(problem: Problem, field: ClearanceField, pose: Pose) -> bool:
     size = radius / CELLS
     ahead, across = size * (np.arange(CELLS) + 0.5)[:, None], size * (np.arange(-CELLS, CELLS) + 0.5)
     farthest = np.minimum(ahead + size / 2, radius)
-    inside = np.abs(across) - size / 2 <= radius - np.sqrt(radius**2 - farthest**2) + CLEARANCE_MARGIN
+    # A difference of squares may be negative by rounding where this is 0.
+    beside = radius - np.sqrt((radius - farthest) * (radius + farthest))
+    inside = np.abs(across) - size / 2 <= beside + CLEARANCE_MARGIN
     c, s = math.cos(pose[2]), math.sin(pose[2])
     middles = np.stack([pose[0] + c * ahead - s * across, pose[1] + s * ahead + c * across], axis=-1)
     enough = np.zeros(inside.shape, bool)
