@@ -57,7 +57,8 @@ MOST_TRIES = 50
 REACHED_XY, REACHED_YAW, PATIENCE = 0.25, 0.5, 180.0
 #: Within this of the goal the path may end [m, rad]; a place is one only if ways lead on from it in directions off by SLANT, too.
 TOLERANCE_XY, TOLERANCE_YAW, SLANT = 0.15, 0.3, 0.4
-#: Time in which the judge looks for a path on a map without one, and the times without a path that are judged [s].
+#: Time in which the judge looks for a path on a map without one, and in which one is sought between homes before the drive; and
+#: the times without a path that are judged [s].
 JUDGING_TIME, JUDGED = 3.0, 1.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {"robot_radius": BODY + MARGIN, "turning_radius": TURNING_RADIUS, "replan_on_map_change": True, "replan_rate": 2.0,
@@ -168,13 +169,13 @@ class Car:
         """Return a pose from which a way leads to others, and back again."""
         for _ in range(MOST_TRIES):
             home, other = self._random_pose(0.6), self._random_pose(0.6)
-            if self._leads(home, other) and self._leads(other, home):
+            if self._leads(home, other, JUDGING_TIME) and self._leads(other, home, JUDGING_TIME):
                 return home
         raise SystemExit(NO_ROOM)
 
-    def _leads(self, start: tuple, goal: tuple) -> bool:
+    def _leads(self, start: tuple, goal: tuple, seconds: float = 0.3) -> bool:
         """Return True if a way leads from a place, which the car may have reached in another direction, to another one."""
-        settings = Settings(planner="rrt", planning_time=0.3, seed=1)
+        settings = Settings(planner="rrt", planning_time=seconds, seed=1)
         starts = [(*start[:2], math.remainder(start[2] + turn, math.tau)) for turn in (0.0, -SLANT, SLANT)]
         return all(plan(Problem(self._world, start=start, goal=goal), settings).solved for start in starts)
 
