@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 #: Way of the vehicle's fastest point from one of the points to the next, in preferred clearances, and their maximum number.
 SPACING, MOST_POINTS = 1 / 64, 1_000_000
-#: Size of the pieces that a path over cells with costs is cut into, in cells, and number of parts of one that leaves its cell.
-CELL_PIECE, CELL_PARTS = 1 / 8, 64
+#: Size of the pieces that a path over cells with costs is cut into, in cells; number of parts of one that leaves its cell, and
+#: how often that is done with those parts that do.
+CELL_PIECE, CELL_PARTS, CELL_CUTS = 1 / 8, 8, 4
 #: Relative error of a cost that is claimed and right: that of the planner's integrals, and that of these.
 COST_ERROR = 1.5e-3
 #: Error of a share of the length with room that is claimed and right, where the room is about what counts as such.
@@ -92,16 +93,22 @@ def _rooms(arcs: Arcs, problem: Problem, preferred_clearance: float, obstacles: 
 def _over_cells(arcs: Arcs, grid: GridMap, check_time: Callable[[], None]) -> float:
     """Return the integral of the costs of the cells under the reference point, as shares of 100 % [m]."""
     index, begin, size = arcs.pieces(max(CELL_PIECE * grid.resolution, float(arcs.length.sum()) / MOST_POINTS))
-    integral, parts = 0.0, (np.arange(CELL_PARTS) + 0.5) / CELL_PARTS
+    integral = 0.0
     for first in range(0, len(index), AT_ONCE):
         check_time()
         some = slice(first, first + AT_ONCE)
-        arc, start, long = index[some], begin[some], size[some]
-        stays = _cell_at(grid, arcs, arc, start) == _cell_at(grid, arcs, arc, start + long)
-        integral += float((long * _shares(grid, _cell_at(grid, arcs, arc, start + long / 2)))[stays].sum())
-        arc, start, long = (array[~stays, None] for array in (arc, start, long))
-        arc = np.broadcast_to(arc, (len(arc), CELL_PARTS))
-        integral += float((long / CELL_PARTS * _shares(grid, _cell_at(grid, arcs, arc, start + long * parts))).sum())
+        integral += _over_pieces(arcs, grid, index[some], begin[some], size[some], CELL_CUTS)
+    return integral
+
+
+def _over_pieces(arcs: Arcs, grid: GridMap, arc: np.ndarray, begin: np.ndarray, size: np.ndarray, cuts: int) -> float:
+    """Return the integral over pieces of arcs, those that leave their cells being cut so many times [m]."""
+    leaves = _cell_at(grid, arcs, arc, begin) != _cell_at(grid, arcs, arc, begin + size)
+    counts = ~leaves | (cuts == 0)
+    integral = float((size * _shares(grid, _cell_at(grid, arcs, arc, begin + size / 2)))[counts].sum())
+    if cuts > 0 and leaves.any():
+        arc, begin, size = (np.repeat(array[leaves], CELL_PARTS) for array in (arc, begin, size / CELL_PARTS))
+        integral += _over_pieces(arcs, grid, arc, begin + size * np.tile(np.arange(CELL_PARTS), leaves.sum()), size, cuts - 1)
     return integral
 
 
