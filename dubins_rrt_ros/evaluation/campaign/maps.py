@@ -95,21 +95,21 @@ MAPS: dict[str, Callable[[np.random.Generator], Map]] = {
 
 
 def placed(free: shapely.Geometry, origin: Pose) -> PolygonMap:
-    """Rotate polygons about (0, 0) and move them to the origin; repair what rounding makes invalid."""
+    """Rotate polygons about (0, 0) and move them to the origin; repair what rounding makes invalid; nothing becomes a square."""
     x, y, yaw = origin
     c, s = math.cos(yaw), math.sin(yaw)
     free = affinity.affine_transform(free, [c, -s, s, c, x, y])
     if not free.is_valid:
         free = shapely.make_valid(free, method="structure", keep_collapsed=False)
-    return PolygonMap(free)
+    return PolygonMap(free if free.area > 0 else shapely.box(x, y, x + 1, y + 1))
 
 
 def _grid(rng: np.random.Generator, data: np.ndarray) -> GridMap:
-    return GridMap(data, log_uniform(rng, *RESOLUTIONS), random_origin(rng))
+    return GridMap(data, log_uniform(rng, *RESOLUTIONS), random_origin(rng), percent=True)
 
 
 def _placed(rng: np.random.Generator, free: shapely.Geometry) -> PolygonMap:
-    return placed(free if free.area > 0 else shapely.box(0, 0, 1, 1), random_origin(rng))
+    return placed(free, random_origin(rng))
 
 
 def _room(rng: np.random.Generator, side: float) -> shapely.Geometry:
