@@ -100,7 +100,8 @@ def placed(free: shapely.Geometry, origin: Pose) -> PolygonMap:
     c, s = math.cos(yaw), math.sin(yaw)
     free = affinity.affine_transform(free, [c, -s, s, c, x, y])
     if not free.is_valid:
-        free = shapely.make_valid(free, method="structure", keep_collapsed=False)
+        parts = shapely.get_parts(shapely.make_valid(free, method="structure", keep_collapsed=False))
+        free = shapely.union_all(parts[shapely.area(parts) > 0])
     return PolygonMap(free if free.area > 0 else shapely.box(x, y, x + 1, y + 1))
 
 
