@@ -15,7 +15,7 @@ import numpy as np
 
 from ._kernels import COMPILED
 from .curves.path import Path
-from .deadline import Deadline
+from .deadline import Deadline, OutOfTime
 from .planner import SAME
 from .problem import Pose, Problem
 from .result import Plan
@@ -71,7 +71,7 @@ class HeadingChoice:
             for n, (leg, (i, j)) in enumerate(zip(self.legs, pairwise(headings), strict=True)):
                 if not leg.is_curve(i, j) and n not in self._known:
                     self._draft(leg, leg.starts[i], [leg.ends[j]])
-            before, headings = headings, self._cheapest()
+            before, headings = headings, self._cheapest() or headings
             if headings == before:
                 break
         self._headings = headings
@@ -129,18 +129,33 @@ class HeadingChoice:
         return [(leg, i, j) for leg, (i, j) in legs if not leg.is_closed(i, j)]
 
     def _cheapest(self) -> list[int] | None:
-        """Return the headings with which the legs are cheapest, as far as paths of them are known; None where there is none."""
-        while True:
-            headings = cheapest_chain([leg.costs for leg in self.legs])
-            ends = list(pairwise(headings))
-            unsure = [n for n, (leg, (i, j)) in enumerate(zip(self.legs, ends, strict=True))
-                      if not leg.decide(i, j, self._clock.poll)]
-            if not unsure:
-                return headings if first_impassable([leg.costs for leg in self.legs]) is None else None
-            for n in unsure:
-                if self.legs[n].has_obstacles and n not in self._explored:
-                    self._explored.add(n)
-                    self._explore(n)
+        """Return the headings with which the legs are cheapest, as far as paths of them are known.
+
+        None where there is none, or no time to find out.
+        """
+        try:
+            while unsure := self._undecided(headings := cheapest_chain([leg.costs for leg in self.legs])):
+                for n in unsure:
+                    if self.legs[n].has_obstacles and n not in self._explored:
+                        self._clock.check()
+                        self._explored.add(n)
+                        self._explore(n)
+        except OutOfTime:
+            return None
+        return headings if first_impassable([leg.costs for leg in self.legs]) is None else None
+
+    def _undecided(self, headings: list[int]) -> list[int]:
+        """Decide what the legs cost between headings, and return the numbers of those that may have become dearer.
+
+        Raises:
+            OutOfTime: there is no more time.
+        """
+        unsure = []
+        for n, (leg, (i, j)) in enumerate(zip(self.legs, pairwise(headings), strict=True)):
+            self._clock.check()
+            if not leg.decide(i, j, self._clock.poll):
+                unsure.append(n)
+        return unsure
 
     def _explore(self, number: int) -> None:
         """Look for paths of a leg between several headings at its ends; where none is found so, plan it."""

@@ -102,7 +102,18 @@ class _Call:
 
     def answer(self) -> Plan:
         """Choose the headings, plan the legs, and join them."""
-        stops = list(stops_of(replace(self._problem, goal=self._aim), self._waypoints))
+        try:
+            stops = [stop for stop in stops_of(replace(self._problem, goal=self._aim), self._waypoints) if self._in_time()]
+            return self._answer_over(stops)
+        except OutOfTime:
+            return self._out_of_time()
+
+    def _in_time(self) -> bool:
+        """Return True; raises OutOfTime where there is no more time."""
+        self._clock.check()
+        return True
+
+    def _answer_over(self, stops: list[Stop]) -> Plan:
         if len(stops) < 3:
             return self._single_leg(stops)
         if not self.world.field.pose_is_free(self._problem.start, self._problem.vehicle) and self._problem.start_slack > 0:
@@ -150,6 +161,7 @@ class _Call:
     def _without_room(self, stops: list[Stop]) -> Plan | None:
         """Leave out the poses at which the vehicle touches an obstacle; return the plan without a path where none is left."""
         for n, stop in enumerate(stops):
+            self._clock.check()
             room = [pose for pose in stop.poses if self.world.field.pose_is_free(pose, self._problem.vehicle)]
             if not room:
                 before, after = stops[max(n, 1) - 1:max(n, 1) + 1]
@@ -163,7 +175,7 @@ class _Call:
         parts = legs_along(seed, stops) if seed and seed.radius == vehicle.turning_radius else None
         if parts is not None:
             stops[1:-1] = [stop.with_pose(part.end) for stop, part in zip(stops[1:-1], parts, strict=False)]
-        legs = [self._leg(here, there) for here, there in pairwise(stops)]
+        legs = [self._leg(here, there) for here, there in pairwise(stops) if self._in_time()]
         choice = HeadingChoice(legs, self.world, self._problem, self._settings, self._objective, self._rng, self._clock,
                                self._leg_plan)
         for number, part in enumerate(parts or ()):
@@ -272,6 +284,18 @@ class _Call:
         self._clock.reserve = AUDIT_RESERVE * (self._clock.elapsed - began)
         return Audit((*audit.findings, *passing_findings(path, self._waypoints)), audit.min_clearance, audit.max_curvature)
 
+    def _out_of_time(self) -> Plan:
+        """Return the plan without a path where the time was up before there were headings to choose from."""
+        if self._clock.cancelled:
+            return self._cancelled_plan()
+        return self._plan(Status.TIMEOUT, f"{self._time_limit()}; allow more time.", self._root())
+
+    def _cancelled_plan(self) -> Plan:
+        return self._plan(Status.CANCELLED, "Cancelled before a first path.", self._root(), cancelled=True)
+
+    def _root(self) -> Tree:
+        return Tree.of_root(self._problem.start, self._problem.vehicle.turning_radius)
+
     def _first_leg_without_path(self, stops: list[Stop], choice: HeadingChoice) -> Plan:
         """Return the plan without a path, with what is known of the first leg that has none."""
         number, found = choice.failure()
@@ -279,9 +303,8 @@ class _Call:
 
     def _not_reached(self, stop: Stop, found: Plan) -> Plan:
         """Return the plan without a path that says which stop is not reached, and what was found instead of a path to it."""
-        root = Tree.of_root(self._problem.start, self._problem.vehicle.turning_radius)
         if self._clock.poll() and self._clock.cancelled:
-            return self._plan(Status.CANCELLED, "Cancelled before a first path.", root, cancelled=True)
+            return self._cancelled_plan()
         x, y, _ = stop.poses[0]
         name = f"waypoint {stop.waypoints[0] + 1}" if stop.waypoints else "the goal"
         status, place = found.status, f"{name} at {at((x, y), 3)}"
@@ -299,7 +322,7 @@ class _Call:
             why = found.message
         elif found.message.startswith("Goal "):
             why = found.message.replace("Goal", name[0].upper() + name[1:], 1)
-        return self._plan(status, why, root, location=found.location)
+        return self._plan(status, why, self._root(), location=found.location)
 
     def _limit(self, found: Plan) -> tuple[str, str]:
         """Return what ended the search for a path of a leg, and what there has to be more of."""
@@ -307,9 +330,12 @@ class _Call:
             return "No path found with the headings that were tried at its ends", "time"
         if not self._settings.informed and found.samples >= found.settings.samples:
             return f"No path found within {found.samples} samples, the leg's share", "samples"
+        return self._time_limit(), "time"
+
+    def _time_limit(self) -> str:
         limit = f"planning_time {self._settings.planning_time:g} s"
         most = ", those without a heading most" if any(theta is None for _, _, theta in self._waypoints) else ""
-        return f"No path within {limit}, and waypoints take more of it than a goal alone{most}", "time"
+        return f"No path within {limit}, and waypoints take more of it than a goal alone{most}"
 
     def _has_all_headings(self, leg: Problem) -> bool:
         """Return True if a leg was planned with all headings that its ends may have."""

@@ -267,6 +267,17 @@ def test_the_same_seed_gives_the_same_path(world, over_both):
     assert through(world, BELOW, ABOVE).path == over_both[0].path
 
 
+@pytest.mark.parametrize(("cancel", "status", "said"), [
+    (None, Status.TIMEOUT, "No path within planning_time 0.001 s, and waypoints take"),
+    (lambda: True, Status.CANCELLED, "Cancelled")])
+def test_more_waypoints_than_there_is_time_for_keep_the_deadline(plane, cancel, status, said):
+    """Their legs are not even made, which alone would take seconds and a tenth of a MB each."""
+    places = [(1 + n % 97, 1 + n % 89) for n in range(5000)]
+    limit = Settings(planning_time=0.001 if cancel is None else 300.0, seed=1)
+    answer = plan_through(Problem(plane, start=(2, 2, 0), goal=(3, 3, 0)), places, limit, cancel=cancel)
+    assert answer.status == status and answer.message.startswith(said)
+
+
 def test_a_cancelled_request_has_no_path(world):
     answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, cancel=lambda: True)
     answer.check()
