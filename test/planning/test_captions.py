@@ -3,11 +3,14 @@
 import math
 
 import pytest
-from support.cases import empty_map
+from support.cases import empty_map, needs_compiled
 
 from dubins_rrt_ros.planning import Problem, Settings, Vehicle, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
 from dubins_rrt_ros.planning.pictures.animation import _DriveScreen
+
+#: What is written of a path does not depend on the kernels that found it.
+pytestmark = needs_compiled
 
 QUICK = {"samples": 20, "planning_time": 60.0, "seed": 1}
 

@@ -108,6 +108,7 @@ def test_a_car_leaves_a_wall_that_its_corner_is_in(world_map, start):
     assert_comes_no_nearer(left(world_map, CAR, start, 0.25), 0.25)
 
 
+@needs_compiled
 @pytest.mark.parametrize("slack", [0.06, 0.3])
 def test_the_swing_of_the_tail_is_told(slack):
     answer = left(ROOM, CAR, (5.0, 0.4, 0.0), slack)

@@ -298,6 +298,7 @@ def test_a_path_that_is_the_dubins_curve_needs_no_proof(monkeypatch):
     assert result.gap < 1e-6 and result.samples == 300
 
 
+@needs_compiled
 def test_on_one_core_nothing_is_proved_without_a_gap_to_stop_at(maze, monkeypatch):
     monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.cores", lambda: 1)
     monkeypatch.setattr("dubins_rrt_ros.planning.proof.background_proof.LengthProof", never)

@@ -226,6 +226,7 @@ def test_progress_of_rrt_has_one_path():
     assert [progress.length for progress in told if progress.improved] == [pytest.approx(result.length)]
 
 
+@needs_compiled
 def test_the_reasons_look_at_the_time(monkeypatch):
     """A clock that moves on by a millisecond with each look ends them in the middle; the proof stands without its figures."""
     grid = np.zeros((2000, 2000), np.int8)
@@ -257,6 +258,7 @@ def test_smoothing_looks_at_the_time_before_the_first_change():
     assert smoothed.length == pytest.approx(16.0)
 
 
+@needs_compiled
 def test_a_simple_path_stays_the_answer_where_there_is_no_time_to_simplify_a_cheaper_one(monkeypatch):
     simplified, simpler = Search.simplified, []
 

@@ -170,7 +170,7 @@ def test_headings_that_have_to_change_together_do():
     assert answer.length <= 25.721 * 1.005  # of legs that are planned between 36 headings
 
 
-@pytest.mark.parametrize("vehicle", [DISC, CAR], ids=["disc", "car"])
+@pytest.mark.parametrize("vehicle", [DISC, pytest.param(CAR, marks=needs_compiled)], ids=["disc", "car"])
 def test_headings_that_are_given_are_kept(vehicle):
     yard_of = prepare(GridMap(yard(), 0.1), vehicle)
     answer = through(yard_of, (*BELOW, 0.3), (*ABOVE, None), (*ABOVE, 2.0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from support import naive
-from support.cases import SCALE, boxes_grid, holed_polygons, naive_clearance, scaled
+from support.cases import SCALE, boxes_grid, holed_polygons, naive_clearance, needs_compiled, scaled
 from support.naive import are_connected, free_space
 
 from dubins_rrt_ros.planning import ClearanceField, PolygonMap, Problem, Status, Vehicle
@@ -129,6 +129,7 @@ def check_claimed_radius(problem, message):
         assert not are_connected(problem, 1e-4)
 
 
+@needs_compiled
 def test_the_time_is_looked_at_before_the_clearance_at_many_points_is_measured():
     """Where a map has many edges that takes long; the passage here is found at some thousand points."""
     class Field(ClearanceField):
