@@ -306,8 +306,6 @@ class _Call:
         if path is None:
             return self._cancelled(search.tree, search.samples) if cancelled else self._failed(search, field)
         before = self._best
-        if before is None:
-            self._is_right(path, search)  # before time is spent on a better form of it
         answer = self._answer_with(path, search.tree, search.samples, cancelled=cancelled and not search.done, search=search)
         if self._best and self._best.improves(before):
             self._on_progress(Progress(answer.samples, answer.planning_time, answer.length, True, lambda: answer,
@@ -317,6 +315,8 @@ class _Call:
     def _answer_with(self, path: Path, tree: Tree, samples: int, cancelled: bool = False, search: Search | None = None) -> Plan:
         """Return the plan with the best path; without it where it fails its audit, with the one before where the time is up."""
         try:
+            if search and self._best is None and (found := self._audited(path, search, simplify=False)).audit.ok:
+                self._keep(found)  # before time is spent on a better form of it
             audited = self._audited(path, search, is_last=True) if search else AuditedPath(path, self._audit(path), tree, samples)
         except OutOfTime:
             cancelled = cancelled or self._deadline.cancelled
