@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from .answer import LEAST_IMPROVEMENT, AuditedPath, defect_message, not_audited_message, success_message
+from .arguments import check_call
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
@@ -69,7 +70,9 @@ def plan(problem: Problem, settings: Settings | None = None, *, cancel: Callable
 
     Raises:
         HookError: `is_free` of the problem or `sampler` of the settings raised an exception, or gave what it should not.
+        TypeError: an argument is of another kind.
     """
+    check_call(cancel, on_progress, seed_path)
     return _Call(demand_problem(problem), demand_settings(settings).with_seed(), cancel or never, on_progress or _ignore,
                  report_samples, seed_path).answer()
 

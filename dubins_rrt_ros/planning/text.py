@@ -1,6 +1,7 @@
 """Values in messages: short, on one line, and in characters that any terminal can show."""
 
 import math
+import re
 import reprlib
 from collections.abc import Sequence
 from typing import Any
@@ -24,8 +25,8 @@ def one_line(message: str) -> str:
 
 
 def quoted(value: Any) -> str:
-    """`value` as Python writes it, of a long or deep one only the beginning."""
-    text = _SHORT.repr(value)
+    """`value` as Python writes it, on one line, of a long or deep one only the beginning."""
+    text = re.sub(r"\n\s*", " ", _SHORT.repr(value))  # an array's rows
     return text if len(text) <= _MOST_QUOTED else f"{text[:_MOST_QUOTED]}..."
 
 

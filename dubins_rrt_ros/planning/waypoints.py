@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .answer import defect_message, effort, end_clause, not_audited_message
+from .arguments import check_call
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
 from .curves.angles import wrap
@@ -62,8 +63,10 @@ def plan_through(problem: Problem, poses: Sequence[Sequence[float | None]], sett
         the waypoint which is not reached.
 
     Raises:
-        HookError, InvalidPose: a function of the user's is wrong, as `plan` says; a waypoint is none.
+        HookError, InvalidPose, TypeError: a function of the user's is wrong, as `plan` says; a waypoint is none; an argument is
+            of another kind.
     """
+    check_call(cancel, on_progress, seed_path)
     waypoints = checked_waypoints(poses)
     settings = demand_settings(settings).with_seed()
     call = _Call(demand_problem(problem), waypoints, settings, cancel or never, on_progress, seed_path)

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_rrt_ros.planning import InvalidPose, Problem, Settings, Vehicle, audit_path, plan, plan_through, prepare
+from dubins_rrt_ros.planning import InvalidPose, Problem, Settings, Vehicle, audit_path, plan, plan_through, prepare, save_map
 from dubins_rrt_ros.planning.maps.cells import FREE, OCCUPIED, DoubtfulGrid
 from dubins_rrt_ros.planning.maps.errors import MapError, MapMetadataError
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw
@@ -160,6 +160,12 @@ def test_what_a_function_does_not_take_is_named():
     for call, says in ((lambda: plan(Settings(), problem), "the problem is Settings"),
                        (lambda: plan(None), "the problem is None"),
                        (lambda: plan(problem, {"samples": 3}), "the settings are {'samples': 3}; give Settings"),
+                       (lambda: plan(problem, cancel=True), "cancel is True; give a function"),
+                       (lambda: plan_through(problem, [], on_progress=5), "on_progress is 5; give a function"),
+                       (lambda: plan(problem, seed_path=[(1, 1, 0)]), "seed_path is .*; give a Path, such as the path of a Plan"),
+                       (lambda: plan_through(problem, [], seed_path=grid), "seed_path is GridMap"),
+                       (lambda: rasterise(grid, 0.1), "the map is GridMap.*; give a PolygonMap"),
+                       (lambda: save_map(np.zeros((4, 4)), "map.yaml"), "the map is array.*; give a GridMap"),
                        (lambda: plan_through(problem, [], 3), "the settings are 3; give Settings"),
                        (lambda: plan_through(problem, None), "the waypoints are None; give a list of poses"),
                        (lambda: plan_through(grid, [(1, 2)]), "the problem is GridMap"),
@@ -282,6 +288,12 @@ def test_obstacles_are_not_taken_for_the_name():
         PolygonMap(SQUARE)
     again = pickle.loads(pickle.dumps(PolygonMap(shapely.box(0, 0, 9, 9), name="yard")))
     assert (again.name, again.free.area) == ("yard", 81)
+
+
+@pytest.mark.parametrize("resolution", [0, -0.1, math.inf, math.nan, "0.1", None])
+def test_a_resolution_that_is_none_makes_no_grid(resolution):
+    with pytest.raises(MapMetadataError, match="resolution is .*; give a positive number"):
+        rasterise(PolygonMap(shapely.box(0, 0, 1, 1)), resolution)
 
 
 def naive_rasterise(polygons, resolution):

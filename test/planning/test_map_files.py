@@ -42,6 +42,17 @@ def test_a_number_of_cells_that_is_none_is_refused(name, value):
         load_map(name, max_map_cells=value)
 
 
+def test_a_map_may_be_named_by_a_url(tmp_path):
+    file = write_grid(tmp_path)
+    assert load_map(f"file://{file}").id == load_map(file).id
+    for url, says in (("file://elsewhere/m.yaml", "'elsewhere'"), ("http://example.org/m.yaml", "http://"),
+                      (f"file://{tmp_path}/n.yaml", "n.yaml: cannot be read")):
+        with pytest.raises(MapNotFound, match=says):
+            load_map(url)
+    with pytest.raises(MapNotFound, match="is outside of map_directory"):
+        load_map(f"file://{file}", map_directory=tmp_path / "maps")
+
+
 def test_other_arguments_of_the_wrong_type_are_refused_by_name():
     for path in (3, None, b"maze", ["maze"]):
         with pytest.raises(TypeError, match=r"^path is .*; give a text or a pathlib\.Path$"):

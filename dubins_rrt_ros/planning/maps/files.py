@@ -28,7 +28,8 @@ def load_map(path: str | os.PathLike[str], *, max_map_cells: int = MAX_MAP_CELLS
     lower left corner at (0, 0).
 
     Args:
-        path: the file, whose leading `~` is the home directory; or the name of one of the package's own maps, such as maze.
+        path: the file, whose leading `~` is the home directory; the name of one of the package's own maps, such as maze; or a
+            URL, `file:///PATH` or `package://PACKAGE/PATH`.
         max_map_cells: maximum number of cells of a grid; judged before its image is read. Of polygons, 64 KiB and 32 bytes for
             each cell may be read, and 64 MiB at most.
         map_directory: the directory in which the file must be, and the image that it names, when links are followed; "" is any.

@@ -41,7 +41,10 @@ def save_map(grid: GridMap, yaml_path: str | os.PathLike[str]) -> None:
 
     Raises:
         MapError: the name has another ending, or a file cannot be written.
+        TypeError: grid is no grid.
     """
+    if not isinstance(grid, GridMap):
+        raise TypeError(f"the map is {quoted(grid)}; give a GridMap, such as rasterise makes of polygons")
     path, rules = Path(yaml_path), Rules()
     image = path.with_suffix(".pgm")
     fields = {"image": image.name, "mode": rules.mode, "resolution": grid.resolution, "origin": list(grid.origin),

@@ -63,7 +63,9 @@ def find_map(name: str) -> Path:
 
 
 def find_own(path: str | os.PathLike[str]) -> Path:
-    """Return a path, its leading `~` replaced; or one of the package's own maps, where it alone has that name."""
+    """Return a path, its leading `~` replaced; the file of a URL; or one of the package's own maps, if it alone has that name."""
+    if isinstance(path, str) and (url := _URL.fullmatch(path)):
+        return _path_of(url)
     return next(filter(os.path.isfile, _places(path)), expand_home(path))
 
 

@@ -347,7 +347,14 @@ def rasterise(polygons: PolygonMap, resolution: float) -> GridMap:
     Args:
         polygons: the map.
         resolution: the side of a cell [m].
+
+    Raises:
+        TypeError: polygons is no polygon map.
+        MapMetadataError: resolution is no size of a cell.
     """
+    if not isinstance(polygons, PolygonMap):
+        raise TypeError(f"the map is {quoted(polygons)}; give a PolygonMap")
+    resolution = _checked_resolution(resolution, polygons.name)
     x0, y0, x1, y1 = shapely.bounds(polygons.free)
     columns, rows = (math.ceil(side / resolution - 1e-9) + 2 for side in (x1 - x0, y1 - y0))
     left = x0 + (np.arange(columns) - 1) * resolution
