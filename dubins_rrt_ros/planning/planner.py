@@ -178,7 +178,7 @@ class _Call:
                 return trapped
             if search.best >= 0 and self._time_to_found is None:
                 self._time_to_found = self._elapsed
-                deadline.reserve = FIRST_AUDIT_SHARE * deadline.left
+                deadline.reserve = FIRST_AUDIT_SHARE * max(0.0, deadline.left)
             self._report(search)
             if self._proof and self._best:
                 self._proof.follow(self._best.path, search.length_bounds, bool(search.bound) or not self._settings.informed)

@@ -68,8 +68,10 @@ def audit_path(path: "Path", problem: Problem, obstacles: Obstacles | None = Non
     """
     if not hasattr(path, "curves"):
         raise TypeError(f"the path is {quoted(path)}; give a Path, such as that of a Plan")
+    check_time()
     if broken := (*_broken_ends(path), *broken_curves(path.curves)):
         return Audit(broken, 0.0, math.inf)
+    check_time()
     starts, ends, arcs = driven_arcs(path.curves, path.start)
     if problem.start_slack > 0:
         too_near, least = judge_clearance(in_order(arcs, len(path.curves)), problem, obstacles, check_time)
