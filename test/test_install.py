@@ -1,6 +1,7 @@
 """What an installation has to hold, whoever made it: pip or colcon. Skipped in a source tree that is not installed."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -57,3 +58,16 @@ def test_the_launchers_in_lib_find_their_own_interpreter(tmp_path):
 
 def test_the_version_is_that_of_package_xml(prefix):
     assert f"<version>{dubins_rrt_ros.__version__}</version>" in (prefix / "share/dubins_rrt_ros/package.xml").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("beside", "remedy"), [("setup.py", "start Python in another folder"),
+                                                ("other.py", "install a C compiler")])
+def test_interpreted_kernels_say_what_to_do(beside, remedy, tmp_path):
+    """A source folder in which Python is started hides the package that is installed."""
+    shutil.copytree(Path(dubins_rrt_ros.__file__).parent, tmp_path / "dubins_rrt_ros",
+                    ignore=shutil.ignore_patterns("*.so", "__pycache__"))
+    (tmp_path / beside).touch()
+    done = subprocess.run([sys.executable, "-c", "import dubins_rrt_ros.planning"], cwd=tmp_path, capture_output=True, text=True,
+                          timeout=120, env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    assert done.returncode == 0 and remedy in done.stderr

@@ -16,6 +16,7 @@ Lengths are in metres, angles in radians, times in seconds. Errors that are rais
 import warnings
 
 from ._kernels import COMPILED as kernels_compiled
+from ._kernels import how_to_compile
 from .audit import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .curves.dubins import WORDS, CurveError, DubinsCurve
@@ -53,5 +54,5 @@ __all__ = [  # noqa: RUF022 - by what a user needs, in this order
 ]
 
 if not kernels_compiled:
-    warnings.warn("the kernels are interpreted, some hundred times slower than compiled; install a C compiler and Cython, then "
-                  "this package again", RuntimeWarning, stacklevel=2)
+    warnings.warn(f"the kernels are interpreted, some hundred times slower than compiled; {how_to_compile()}", RuntimeWarning,
+                  stacklevel=2)
