@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("aiohttp", reason="aiohttp comes with the extra play")
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from nav_msgs.msg import OccupancyGrid
 from support.browser import open_browser
 from support.play import serving_sessions, talk
@@ -177,6 +178,8 @@ def test_in_a_browser_a_drag_sends_the_goal_and_the_path_appears(watched):
             "const v = window.dubins.view; return [v.map.low, v.map.high, v.start, v.goal, [...v.unsent]]")
         assert unsent == ["start", "goal"] and start != goal, "to be taken hold of, before any is sent"
         assert all(low[axis] < pose[axis] < high[axis] for pose in (start, goal) for axis in (0, 1))
+        watched[1]._take_status(DiagnosticStatus(message="Ready for a goal.", values=[KeyValue(key="error_name", value="NONE")]))
+        wait.until(lambda _: browser.find_element(By.ID, "title").text == "No path yet")
         drag = """
             const v = window.dubins.view, c = v.canvas, b = c.getBoundingClientRect();
             const fire = (kind, x, y) => { const [a, d] = v.toScreen(x, y); c.dispatchEvent(new PointerEvent(kind,

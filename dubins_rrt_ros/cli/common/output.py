@@ -64,7 +64,7 @@ def check_drawing(file: str | None, endings: tuple[str, ...] = DRAWINGS) -> None
     if not file:
         return
     if Path(file).suffix.lower() not in endings:
-        raise UsageError(f"a picture named {file} cannot be drawn; let the name end with {', '.join(endings)}")
+        raise UsageError(f"a picture named {file} cannot be drawn; let the name end with one of {', '.join(endings)}")
     require_matplotlib()
     if Path(file).suffix.lower() == VIDEO:
         require_ffmpeg()

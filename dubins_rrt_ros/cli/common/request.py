@@ -49,7 +49,8 @@ class LoadedRequest(NamedTuple):
 def add_map_arguments(parser: argparse.ArgumentParser, pictures: bool = True) -> argparse.Action:
     """Give `parser` the argument MAP, which is returned, and the flags for it, those for pictures too if they are wanted."""
     action = parser.add_argument("map", metavar="MAP", default=argparse.SUPPRESS,
-                                 help=f"a map file ({', '.join(MAP_ENDINGS)}) or an installed map's name, such as maze")
+                                 help=f"a map file ({', '.join(MAP_ENDINGS)}){', a picture with --resolution,' * pictures} "
+                                      "or an installed map's name, such as maze")
     parser.add_argument("--max-map-cells", metavar="N", type=int, default=MAX_CELLS.default,
                         help=f"{MAX_CELLS.describe()}; default {MAX_CELLS.default}")
     if not pictures:

@@ -149,7 +149,8 @@ function receive(data) {
 function showFigures(answer) {
   const metres = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)} m`), time = (value) => (value === null ? "–" : value < 1 ? `${(1000 * value).toFixed(1)} ms` : `${value.toFixed(2)} s`);
   const percent = answer.gap === null ? "–" : `${(100 * answer.gap).toFixed(1)} %`;
-  $("title").textContent = answer.length === null ? `No path: ${answer.status}` : `Path of ${answer.length.toFixed(2)} m`;
+  const reason = ["", "NONE"].includes(answer.status) ? " yet" : `: ${answer.status}`;
+  $("title").textContent = answer.length === null ? `No path${reason}` : `Path of ${answer.length.toFixed(2)} m`;
   $("message").textContent = answer.length === null ? answer.message : "";
   const rows = [["no path is shorter than", metres(answer.lower_bound)], ["at most longer by", percent],
                 ["room to the walls", metres(answer.min_clearance)], ["first path", answer.first_length ? `${metres(answer.first_length)} after ${time(answer.time_to_first)}` : time(answer.time_to_first)],

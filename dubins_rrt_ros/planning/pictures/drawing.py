@@ -158,7 +158,7 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
     draw_path(axes, drawing.vehicle, drawing.path, drawing.rooms)
     draw_poses(axes, drawing)
     if drawing.location is not None:
-        axes.add_line(_failure_mark(*drawing.location, zorder=8))
+        axes.add_line(_failure_mark(*drawing.location, zorder=8, clip_on=False))
 
 
 def _failure_mark(x: float | None = None, y: float | None = None, **style: Any) -> Line2D:
