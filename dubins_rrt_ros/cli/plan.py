@@ -18,7 +18,7 @@ from dubins_rrt_ros.planning.plan_file import repeating
 from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
 from dubins_rrt_ros.planning.vehicle import overridden
 
-from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, write_proof
+from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, proof_limits, write_proof
 from .common.example import ENDS, EXAMPLE, MAP
 from .common.flags import LengthSettings, add_option_flags, add_paper_flag, flag, given_options, given_settings
 from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
@@ -101,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.json, arguments.csv, arguments.plot, arguments.drive, arguments.certificate, sources=sources)
     check_drawing(arguments.plot, DRAWINGS + ANIMATIONS)
     check_drawing(arguments.drive, ANIMATIONS)
+    gap, seconds = proof_limits(arguments)
     request = _request(arguments)
     if arguments.certificate and request.waypoints:
         raise UsageError("a path through waypoints has no certificate; leave --via out")
@@ -118,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.drive and answer.path:
         _draw_drive(arguments.drive, answer)
     if checked_map and answer.path:
-        claim = write_proof(arguments.certificate, answer, checked_map, arguments.gap, arguments.seconds)
+        claim = write_proof(arguments.certificate, answer, checked_map, gap, seconds)
         print(claim, file=words_for(arguments.json))
     return 0 if answer.path else 1
 

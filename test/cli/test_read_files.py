@@ -185,3 +185,30 @@ def test_what_is_odd_about_a_map_is_told_with_its_name_once(capsys):
                               "feature 2, which begins at (0, 20), is the first")
     assert "its crs is 'urn:ogc:def:" in degrees and "CRS84', whose coordinates are degrees" in degrees
     assert error.count("town.geojson") == 2 and len(load_map("town.geojson").warnings) == 2
+
+
+@pytest.mark.parametrize("name", ["json", "csv", "plot", "drive", "certificate"])
+def test_an_empty_name_of_a_file_to_write_is_refused(name, capsys):
+    """As of a variable of the shell that is not set: nothing was written, without a word."""
+    error = run("plan", "square.wkt", *REQUEST, f"--{name}", "", status=2, capsys=capsys).err
+    assert "the name of a file to write is empty; give one" in error
+
+
+@pytest.mark.parametrize(("flags", "said"), [
+    (["--start", "1_0", "4", "0"], "--start: '1_0' is no number; give digits without a unit"),
+    (["--turning-radius", "1m"], "--turning-radius: '1m' is no number; give digits without a unit"),
+    (["--samples", "1e3"], "--samples: '1e3' is no number; give an integer"),
+    (["--informed=false"], "--informed/--no-informed: it takes no value, and has 'false'")])
+def test_what_is_no_number_is_told_with_what_to_give(flags, said, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["plan", "square.wkt", *REQUEST, *flags])
+    assert end.value.code == 2 and said in capsys.readouterr().err
+
+
+def test_limits_of_a_proof_are_numbers_and_told_where_there_is_none(capsys):
+    for name in ("gap", "seconds"):
+        for number in ("-1", "nan", "inf"):
+            assert f"--{name} is {number}; give a number" in run(
+                "plan", "square.wkt", *REQUEST, f"--{name}", number, status=2, capsys=capsys).err
+        error = run("plan", "square.wkt", *REQUEST, f"--{name}", "1", status=0, capsys=capsys).err
+        assert error == f"dubins_rrt plan: warning: --{name} has no effect without --certificate\n"

@@ -1,6 +1,8 @@
 """Certificates of paths, as commands write them."""
 
 import argparse
+import math
+import sys
 from typing import Any
 
 from dubins_rrt_ros.checker.maps import World
@@ -18,10 +20,25 @@ UNCERTIFIED = ("start_slack",)
 def add_certificate_flags(parser: argparse.ArgumentParser) -> None:
     """Give a parser the flags that say how far a proof goes."""
     group = parser.add_argument_group("certificate")
-    group.add_argument("--gap", metavar="SHARE", type=float, default=GAP,
+    group.add_argument("--gap", metavar="SHARE", type=float,
                        help=f"end the proof when the path is at most so much longer than the shortest; default {GAP:g}")
-    group.add_argument("--seconds", metavar="s", type=float, default=SECONDS,
+    group.add_argument("--seconds", metavar="s", type=float,
                        help=f"approximate time for the proof; what is proved then is written; default {SECONDS:g}")
+
+
+def proof_limits(arguments: argparse.Namespace) -> tuple[float, float]:
+    """Return gap and seconds as the flags have them, or the defaults.
+
+    Raises:
+        UsageError: one of them is none.
+    """
+    given = {"gap": arguments.gap, "seconds": arguments.seconds}
+    for name, value in given.items():
+        if value is not None and not 0 <= value < math.inf:
+            raise UsageError(f"--{name} is {value:g}; give a number from 0 on")
+        if value is not None and not arguments.certificate:
+            print(f"dubins_rrt {arguments.command}: warning: --{name} has no effect without --certificate", file=sys.stderr)
+    return GAP if arguments.gap is None else arguments.gap, SECONDS if arguments.seconds is None else arguments.seconds
 
 
 def certifiable_map(problem: Problem, map_name: str) -> World:

@@ -32,12 +32,14 @@ def check_folder(*files: str | None, sources: Iterable[str] = ()) -> None:
         sources: to be read.
 
     Raises:
-        UsageError: one of the files has no folder, is one, is named twice, or is a source.
+        UsageError: one of the files has no name or folder, is one, is named twice, or is a source.
     """
     read, written = {_real(source) for source in sources}, set()
     for file in files:
-        if not file or file == STDOUT:
+        if file is None or file == STDOUT:
             continue
+        if not file:
+            raise UsageError("the name of a file to write is empty; give one, or leave the flag out")
         path = _real(file)
         if not path.parent.is_dir():
             raise UsageError(f"there is no folder {Path(file).parent} to write {path.name} to; make it first")

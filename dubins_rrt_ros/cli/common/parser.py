@@ -8,6 +8,9 @@ from collections.abc import Iterable, Sequence
 from itertools import takewhile
 from typing import Any, NoReturn
 
+#: What to give where a number is wanted, by its type.
+NUMBERS: dict[Any, str] = {int: "give an integer, such as 10", float: "give digits without a unit, such as 0.5"}
+
 
 class UsageError(Exception):
     """The command was used wrongly; the message says how and what to do instead."""
@@ -36,6 +39,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End the process with status 2."""
+        message = message.replace("ignored explicit argument", "it takes no value, and has")
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
@@ -61,6 +65,16 @@ class Parser(argparse.ArgumentParser):
             if isinstance(action.metavar, tuple):  # several numbers, which some write with commas
                 raise argparse.ArgumentError(action, f"give {' '.join(action.metavar)}, with blanks between them") from None
             raise
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        if action.type not in NUMBERS:
+            return super()._get_value(action, arg_string)
+        try:
+            if "_" in arg_string:  # which Python takes between digits
+                raise ValueError
+            return action.type(arg_string)
+        except ValueError:
+            raise argparse.ArgumentError(action, f"{arg_string.strip()!r} is no number; {NUMBERS[action.type]}") from None
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
