@@ -150,7 +150,7 @@ def test_costs_above_0_at_the_ends_take_a_wider_corridor(name, field, tmp_path):
         assert "too narrow" in verdict(document | changed | {"limit": limit}, certified.file, tmp_path)
 
 
-@pytest.mark.parametrize("name", ["polygons", "footprint"])
+@pytest.mark.parametrize("name", ["polygons", pytest.param("footprint", marks=pytest.mark.slow)])
 def test_no_square_with_a_free_place_may_be_left_out(name, tmp_path):
     """Of those in whose middle there is no room: looked for on a fine raster."""
     certified = recorded(name)

@@ -81,6 +81,7 @@ def test_a_number_gives_the_same_problem():
     assert contents(random_trial(3, 0)) != contents(random_trial(4, 0)) != contents(random_trial(4, 1))
 
 
+@pytest.mark.slow
 def test_costs_of_cells_are_drawn_last(monkeypatch):
     """So a problem without them is the one that its number always gave."""
     found = [random_trial(3, number) for number in range(60)]

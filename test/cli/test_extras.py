@@ -37,7 +37,7 @@ def test_plan_audit_render_bench_and_campaign_do_not_need_them(tmp_path):
 @pytest.mark.parametrize("words, extra", [
     ([*PLAN, "--json", "plan.json", "--plot", "maze.png"], "plots"), pytest.param(["demo"], "plots", marks=pytest.mark.slow),
     pytest.param(["bench", "--report", "runs.jsonl", "--plot", "runs.png"], "plots", marks=pytest.mark.slow),
-    (["paper", "--out", "paper"], "evaluation"),
+    pytest.param(["paper", "--out", "paper"], "evaluation", marks=pytest.mark.slow),
     pytest.param(["figures", "--out", "figures"], "evaluation", marks=pytest.mark.slow)])
 def test_what_draws_says_what_to_install_before_any_work(words, extra, tmp_path):
     done = without_extras(tmp_path, *words)

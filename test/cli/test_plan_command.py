@@ -79,6 +79,7 @@ def test_a_pose_with_commas_is_told_how_it_is_written(hall, capsys):
         assert "argument --start: give X Y YAW, with blanks between them" in error
 
 
+@pytest.mark.slow
 def test_the_drive_along_a_path_is_an_animation(hall, capsys):
     assert run(hall, *REQUEST, *BUDGET, "--drive", "drive.gif", capsys=capsys)[0] == 0
     assert Image.open("drive.gif").n_frames > 50

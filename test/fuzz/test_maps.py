@@ -66,6 +66,7 @@ def test_bmp(content):
     image_or_refused(content)
 
 
+@pytest.mark.slow
 @fuzz
 @given(spoiled(PNGS))
 def test_png_whose_checksums_tell(content):

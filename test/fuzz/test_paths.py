@@ -85,6 +85,7 @@ def test_echoed_path(folder, content):
         judged(folder, "p.yaml", content)
 
 
+@pytest.mark.slow
 @fuzz
 @given(data=st.data())
 def test_plan_document(folder, document, data):

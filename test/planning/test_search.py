@@ -264,7 +264,7 @@ def test_the_tree_holds_the_smoothed_path(step, problems):
 
 
 @needs_compiled
-@pytest.mark.parametrize("turning_radius", [0.1, 0.001])
+@pytest.mark.parametrize("turning_radius", [pytest.param(0.1, marks=pytest.mark.slow), 0.001])
 def test_a_smaller_turning_radius_hardly_makes_a_path_longer(turning_radius):
     """Whatever the one vehicle drives the other can; it used to be a third longer, or not found at all."""
     rng = np.random.default_rng(1)

@@ -133,6 +133,7 @@ def test_in_the_open_plane_the_whole_is_shortest(plane):
     assert shorter >= 0.9 * differs
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_where_waypoints_have_headings_the_bound_is_the_sum_of_what_is_proved_of_the_legs():
     """With a free heading a leg's proof, which is of one heading, does not count."""
@@ -161,6 +162,7 @@ def test_between_obstacles_the_whole_is_as_short_as_the_best_of_many_planned_leg
     assert answer.length <= cost[0] * 1.005
 
 
+@pytest.mark.slow
 @needs_compiled
 def test_headings_that_have_to_change_together_do():
     maze = prepare(load_map("maze"), Vehicle(turning_radius=1.0, robot_radius=0.3))
