@@ -16,6 +16,8 @@ from support.cases import boxes_grid, maze_grid
 
 #: A path is planned with so many samples.
 SETTINGS = Settings(samples=300, seed=1, preferred_clearance=0.0, planning_time=1.0)
+#: Ratio of a random problem's path to the Dubins curve, from which on its certificate is to have boxes.
+LEAST_RATIO = 1.02
 RECORDED = Path(__file__).resolve().parents[1] / "checker" / "recorded"
 
 
@@ -77,11 +79,22 @@ def pose_in(grid, x, y, yaw):
 
 
 def random_certified(rng, folder, seconds):
-    """The certificate of a random small problem, mostly of up to sixty boxes after 0.2 s; None where there is no path."""
+    """The certificate of a random small problem, mostly of up to sixty boxes; None where there is no path, or no need for boxes.
+
+    It is to halve the gap of the Dubins curve without obstacles, which takes few boxes.
+    """
     grid = (boxes_grid, maze_grid)[rng.integers(2)](rng, side=18)
-    vehicle = Vehicle(turning_radius=float(rng.uniform(0.3, 1.0)), robot_radius=float(rng.uniform(0.15, 0.4)))
-    side = 18 * grid.resolution
-    start, goal = (pose_in(grid, *rng.uniform(0.1 * side, 0.9 * side, 2), float(rng.uniform(-math.pi, math.pi)))
-                   for _ in range(2))
+    vehicle = Vehicle(turning_radius=float(rng.uniform(0.2, 0.5)), robot_radius=float(rng.uniform(0.1, 0.35)))
+    side, heading = 18 * grid.resolution, rng.uniform(-0.8, 0.8)  # far from each other, so that obstacles lie between
+    start, goal = (pose_in(grid, side * (share + rng.uniform(-0.1, 0.1)), side * rng.uniform(0.1, 0.9), heading)
+                   for share in (0.2, 0.8))
     request = [{}, {}, {"goal_tolerance_xy": 0.2, "goal_tolerance_yaw": 0.3}, {"any_goal_heading": True}][rng.integers(4)]
-    return certified(Problem(grid, vehicle, start, goal, **request), saved(grid, folder), gap=0.1, seconds=seconds)
+    problem, file = Problem(grid, vehicle, start, goal, **request), saved(grid, folder)
+    answer = plan(problem, SETTINGS)
+    if answer.path is None:
+        return None
+    world = checked_map(problem, file)
+    bound = certify(problem, answer.path, world, math.inf, 0.0)["bound"]
+    if bound == 0 or answer.path.length < LEAST_RATIO * bound:
+        return None
+    return Certified(certify(problem, answer.path, world, (answer.path.length / bound - 1) / 2, seconds), file)
