@@ -9,6 +9,8 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("aiohttp", reason="aiohttp comes with the extra play")
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, PoseArray
+from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import OccupancyGrid
 from support.browser import open_browser
 from support.play import serving_sessions, talk
@@ -161,6 +163,21 @@ def test_waypoints_of_another_node_are_shown_until_a_goal_without_comes(watched)
         return shown
     until(lambda: listener._publishers["goal_poses"].get_subscription_count() > 1)
     assert talk(watched[2], follow) == [[1.0, 2.0]]
+
+
+def test_waypoints_that_are_none_are_not_shown_and_a_page_gets_nothing_but_json(watched_by_all):
+    """NaN is no JSON: a browser would have shown nothing of it, and every later page neither."""
+    listener = watched_by_all[1]
+    shown = dict(listener._ends), list(listener._waypoints)
+    for x in (math.nan, math.inf):
+        listener._take_goals(PoseArray(poses=[PoseMessage(position=Point(x=x)), PoseMessage()]))
+    assert (listener._ends, listener._waypoints) == shown
+    sent = []
+    session = WatchSession(listener, sent.append)
+    session.show({"type": "answer", "length": math.inf, "path": [math.nan, 1.0]})
+    session.take("[]")
+    listener.pages.discard(session.show)
+    assert sent[-2] == '{"type": "answer", "length": null, "path": [null, 1.0]}' and "it is no object" in sent[-1]
 
 
 @pytest.mark.slow

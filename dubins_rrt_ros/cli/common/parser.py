@@ -72,7 +72,7 @@ class Parser(argparse.ArgumentParser):
         try:
             if "_" in arg_string:  # which Python takes between digits
                 raise ValueError
-            return action.type(arg_string)
+            return int(arg_string) if action.type is int else float(arg_string)
         except ValueError:
             raise argparse.ArgumentError(action, f"{arg_string.strip()!r} is no number; {NUMBERS[action.type]}") from None
 

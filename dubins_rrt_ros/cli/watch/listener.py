@@ -152,9 +152,10 @@ class Listener:
 
     def _take_goals(self, message: PoseArray) -> None:
         """Show waypoints, and the goal after them, whose heading stays as it was where any will do."""
-        if not message.poses:
-            return
-        *self._waypoints, (x, y) = [(pose.position.x, pose.position.y) for pose in message.poses]
+        places = [(pose.position.x, pose.position.y) for pose in message.poses]
+        if not places or not np.isfinite(places).all():
+            return  # which the planner tells in its status
+        *self._waypoints, (x, y) = places
         try:
             self._send_pose("goal", pose_from("goal", message.poses[-1]))
         except ValueError:

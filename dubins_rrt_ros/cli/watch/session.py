@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dubins_rrt_ros.planning import checked_pose
 
+from ..common.output import finite
 from ..play import messages
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class WatchSession:
 
     def show(self, document: dict[str, Any] | bytes) -> None:
         """Send a document."""
-        self._send(document if isinstance(document, bytes) else json.dumps(document))
+        self._send(document if isinstance(document, bytes) else json.dumps(finite(document), allow_nan=False))
 
     async def close(self) -> None:
         """End; the planner does not notice."""
@@ -39,7 +40,10 @@ class WatchSession:
     def take(self, text: str) -> None:
         """Take a message of the page."""
         try:
-            self._take(json.loads(text))
+            document = json.loads(text)
+            if not isinstance(document, dict):
+                raise ValueError("it is no object")
+            self._take(document)
         except Exception as error:  # of any kind: the page goes on
             self._refuse(str(error) or type(error).__name__)
 
