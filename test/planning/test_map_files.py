@@ -28,6 +28,15 @@ def test_first_image_row_is_the_top_of_the_map(tmp_path):
     assert (grid.name, grid.resolution, grid.origin) == ("m.yaml", 0.05, (0, 0, 0))
 
 
+@pytest.mark.parametrize(("rows", "fields", "said"), [
+    ([[0, 1], [1, 1]], {}, "no cell is free: the pixels have a brightness of 0 to 1, of 0 (black) to 255 (white)"),
+    ([[0, 100]], {}, "0 to 100"), ([[254, 254]], {"negate": 1}, "negate: 1"), ([[254, 254]], {"mode": "raw"}, "mode raw"),
+    ([[0, 254]], {}, ""), ([[0, 100]], {"mode": "raw"}, "")])
+def test_a_picture_without_a_free_cell_is_told(rows, fields, said, tmp_path):
+    warnings = load_map(write_grid(tmp_path, rows, **fields)).warnings
+    assert len(warnings) == bool(said) and said in "".join(warnings)
+
+
 def test_origin_with_yaw_places_the_cells(tmp_path):
     grid = load_map(write_grid(tmp_path, resolution="1e-1", origin=f"[1, 2, {np.pi / 2!r}]"))
     assert grid.origin == (1, 2, np.pi / 2)
@@ -200,8 +209,8 @@ def test_what_is_likely_a_slip_in_a_map_file_is_told(tmp_path, changes, doubt):
 
 
 @pytest.mark.parametrize("rows, changes", [
-    ([[205, 0, 254]], {}), ([[204, 0, 254]], {"free_thresh": "0.25"}), ([[205, 100]], {"mode": "raw", "free_thresh": "0.25"}),
-    ([[205, 0]], {"negate": "1", "free_thresh": "0.25"}), ([[50, 255]], {"negate": "1"})])
+    ([[205, 0, 254]], {}), ([[204, 0, 254]], {"free_thresh": "0.25"}), ([[205, 100, 0]], {"mode": "raw", "free_thresh": "0.25"}),
+    ([[205, 0]], {"negate": "1", "free_thresh": "0.25"}), ([[50, 255, 0]], {"negate": "1"})])
 def test_unknown_space_that_is_not_free_is_not_told(tmp_path, rows, changes):
     assert load_map(write_grid(tmp_path, rows, **changes)).warnings == ()
 
@@ -225,7 +234,7 @@ def test_a_drawing_without_a_background_is_doubted(tmp_path):
     Image.fromarray(pixels).save(tmp_path / "m.png")
     warning, = load_map(tmp_path / "m.png", resolution=0.1).warnings
     assert warning.startswith("60.00% of the pixels are transparent, and so unknown")
-    pixels[4, :, 3] = 255
+    pixels[4] = 255
     Image.fromarray(pixels).save(tmp_path / "m.png")
     assert load_map(tmp_path / "m.png", resolution=0.1).warnings == ()
 

@@ -62,7 +62,8 @@ def cells_of(picture: Picture, rules: Rules, unknown_grey: int) -> tuple[np.ndar
     cells = values[picture.grey[::-1]]
     if picture.transparent is not None and rules.mode != "raw":
         cells[picture.transparent[::-1]] = UNKNOWN
-    return cells, (*_unknown_taken_as_free(picture, rules, cells), *_transparency(picture, rules), *_colours(picture, values))
+    doubts = (*_unknown_taken_as_free(picture, rules, cells), *_transparency(picture, rules), *_colours(picture, values))
+    return cells, doubts or tuple(_nothing_free(picture, rules, cells))
 
 
 def _unknown_taken_as_free(picture: Picture, rules: Rules, cells: np.ndarray) -> Iterator[str]:
@@ -79,6 +80,13 @@ def _transparency(picture: Picture, rules: Rules) -> Iterator[str]:
     if share > MOST_TRANSPARENT:
         yield (f"{share:.2%} of the pixels are transparent, and so unknown, as for map_server; if they are free, save the image "
                "without transparency, on white")
+
+
+def _nothing_free(picture: Picture, rules: Rules, cells: np.ndarray) -> Iterator[str]:
+    """Yield that there is no room at all, as where 0 and 1 or percent were saved in place of brightness."""
+    if not ((cells >= FREE) & (cells <= DEFAULT_THRESHOLDS.free_up_to)).any():
+        yield (f"no cell is free: the pixels have a brightness of {picture.grey.min()} to {picture.grey.max()}, of 0 (black) to "
+               f"255 (white), in the mode {rules.mode} with negate: {int(rules.negate)}; draw free space white")
 
 
 def _colours(picture: Picture, values: np.ndarray) -> Iterator[str]:
