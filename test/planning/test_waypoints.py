@@ -268,6 +268,7 @@ def test_what_is_no_waypoint_is_refused(world, pose):
         through(world, BELOW, pose)
 
 
+@needs_compiled
 def test_the_same_seed_gives_the_same_path(world, over_both):
     assert through(world, BELOW, ABOVE).path == over_both[0].path
 
@@ -289,6 +290,7 @@ def test_a_cancelled_request_has_no_path(world):
     assert answer.status == Status.CANCELLED or answer.cancelled
 
 
+@needs_compiled
 def test_the_first_path_is_reported(over_both):
     answer, reports = over_both
     first = reports[0].snapshot()
@@ -325,6 +327,7 @@ def test_a_request_that_is_cancelled_during_its_first_audit_is_cancelled(world, 
     assert answer.status == Status.CANCELLED and answer.path is None
 
 
+@needs_compiled
 def test_the_audit_finds_a_waypoint_that_is_not_passed(over_both):
     path = over_both[0].path
     assert not list(passing_findings(path, [(*BELOW, None), (*BELOW, None), (*ABOVE, None)]))
@@ -347,9 +350,9 @@ def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_
             assert plan_through(Problem(world, start=start, goal=goal), [waypoint], settings).solved
 
 
-@pytest.mark.parametrize("given", [True, False], ids=["headings given", "any heading"])
-def test_a_path_that_is_known_is_where_it_begins(world, known, over_both, given):
-    rest = (known if given else over_both[0].path).after(0.7)
+@pytest.mark.parametrize("given", [True, pytest.param(False, marks=needs_compiled)], ids=["headings given", "any heading"])
+def test_a_path_that_is_known_is_where_it_begins(world, known, given, request):
+    rest = (known if given else request.getfixturevalue("over_both")[0].path).after(0.7)
     again = plan_through(Problem(world, start=rest.start, goal=GOAL), WITH_HEADINGS if given else [BELOW, ABOVE], FIRST,
                          seed_path=rest)
     again.check()

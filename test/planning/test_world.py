@@ -162,6 +162,7 @@ def test_two_vehicles_on_one_map_prepare_once_each(monkeypatch):
     assert_same(small, prepare(small.map, SMALL))
 
 
+@needs_compiled
 @pytest.mark.parametrize("make", [boxes_grid, holed_polygons])
 def test_what_the_room_of_a_footprint_needs_is_prepared(make, monkeypatch):
     """On a map of nine million cells it took 0.14 s of a request for 0.05 s."""
