@@ -95,12 +95,11 @@ class _Call:
         self._obstacles: Obstacles | None = None  # until the world is ready
         self._own_test: OwnTest | None = None
         self._best: AuditedPath | None = None
-        self._audit_took = self._simplifying_took = 0.0
+        self._map_time = self._audit_took = self._simplifying_took = 0.0
         self._found_cost = math.inf  # of the best path of the search that was audited last
         self._last_audit, self._last_report = -math.inf, 0.0  # when they ended [s]
         self._time_to_first: float | None = None
         self._time_to_found: float | None = None
-        self._map_time = 0.0
         self._objective: Objective | None = None  # until the search begins
         self._proof: BackgroundProof | None = None
 
@@ -323,7 +322,10 @@ class _Call:
             audited = self._audited(path, search, is_last=True) if search else AuditedPath(path, self._audit(path), tree, samples)
         except OutOfTime:
             cancelled = cancelled or self._deadline.cancelled
-            return self._with_path(self._best, cancelled) if self._best else self._not_audited(path, tree, samples)
+            if self._best:
+                return self._with_path(self._best, cancelled)
+            status = Status.CANCELLED if cancelled else Status.TIMEOUT
+            return self._plan(status, not_audited_message(path), tree, samples=samples, cancelled=cancelled)
         if not audited.audit.ok:
             return self._plan(Status.UNKNOWN, defect_message(audited.audit), tree, samples=samples, audit=audited.audit)
         if not (self._best and self._best.outlasts(audited, price_of_curve(self._problem.vehicle))):
@@ -340,11 +342,6 @@ class _Call:
         """Return how long the lower bound is waited for [s]: an answer of RRT, which ends with its first path, does not wait."""
         return 0.0 if self._settings.planner == "rrt" or self._deadline.cancelled else max(0.0, self._deadline.left)
 
-    def _not_audited(self, path: Path, tree: Tree, samples: int) -> Plan:
-        """Return the plan without a path where one was found, but too late for its audit."""
-        status, cancelled = Status.CANCELLED if self._deadline.cancelled else Status.TIMEOUT, self._deadline.cancelled
-        return self._plan(status, not_audited_message(path), tree, samples=samples, cancelled=cancelled)
-
     def _cancelled(self, tree: Tree, samples: int) -> Plan:
         message = f"Cancelled before a first path: {self._drawn(samples, len(tree))}."
         return self._plan(Status.CANCELLED, message, tree, samples=samples, cancelled=True)
@@ -355,10 +352,8 @@ class _Call:
         if trapped := self._trapped(search, field):
             return trapped
         tree, drawn = search.tree, self._drawn(search.samples, search.growing.size)
-        if search.done:
-            what, more = "No path found", "samples"
-        else:
-            what, more = f"No path within planning_time {self._limit:g} s", "time"
+        too_late = f"No path within planning_time {self._limit:g} s", "time"
+        what, more = ("No path found", "samples") if search.done else too_late
         try:
             why, location = explain.after_search(self._problem, field, tree, more, self._deadline.check)
         except OutOfTime:
