@@ -252,10 +252,10 @@ class _Call:
         simple, simplified, is_simple = self._simplified(path, search) if simplify and not is_length else (path, 0, is_length)
         if is_last:
             simple = search.without_short_arcs(simple, merging)
-        self._found_cost = search.cost
-        return AuditedPath(simple, self._audit(simple), search.tree_with(simple), search.samples, search.growing.found_by,
-                           search.objective.path_cost(simple), path, is_simple,
-                           WorkDone(search.work.done, simplified, merging.done))
+        self._found_cost, began = search.cost, self._elapsed
+        tree, cost = search.tree_with(simple), search.objective.path_cost(simple)
+        return AuditedPath(simple, self._audit(simple, began), tree, search.samples, search.growing.found_by, cost, path,
+                           is_simple, WorkDone(search.work.done, simplified, merging.done))
 
     def _simplified(self, path: Path, search: Search) -> tuple[Path, int, bool]:
         """Return a simpler form of a path, the work of it, and whether there was the time for all of that."""
@@ -268,11 +268,10 @@ class _Call:
         self._simplifying_took = self._elapsed - began
         return simple, work.done, not work.is_interrupted
 
-    def _audit(self, path: Path) -> Audit:
-        """Audit a path, unless that was done last."""
+    def _audit(self, path: Path, began: float) -> Audit:
+        """Audit a path, unless that was done last; it took the time since it `began` [s] to do what goes with that, too."""
         if self._best and self._best.path == path:
             return self._best.audit
-        began = self._elapsed
         audit = audit_path(path, self._problem, self._obstacles, self._deadline.check)
         self._last_audit, self._audit_took = self._elapsed, self._elapsed - began
         if self._objective and not self._objective.is_length and self._simplifying_took == 0:
@@ -319,7 +318,8 @@ class _Call:
         try:
             if search and self._best is None and (found := self._audited(path, search, simplify=False)).audit.ok:
                 self._keep(found)  # before time is spent on a better form of it
-            audited = self._audited(path, search, is_last=True) if search else AuditedPath(path, self._audit(path), tree, samples)
+            audited = (self._audited(path, search, is_last=True) if search
+                       else AuditedPath(path, self._audit(path, self._elapsed), tree, samples))
         except OutOfTime:
             cancelled = cancelled or self._deadline.cancelled
             if self._best:
