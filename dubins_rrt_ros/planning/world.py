@@ -109,7 +109,7 @@ def prepare(map: Map, vehicle: Vehicle, allow_unknown: bool = False,  # noqa: A0
     world.field.components(vehicle.required_clearance)
     world.field.free_squares(vehicle.required_clearance)
     if vehicle.footprint:
-        world.field.room(vehicle)
+        world.field.room(vehicle)  # the first one finds the corners of the obstacles, which are kept
     world.obstacles  # noqa: B018 - computed now
     return world
 

@@ -57,7 +57,7 @@ def test_a_path_is_audited_before_time_is_spent_on_its_better_forms(monkeypatch)
         time.sleep(0.02)
         return path
     monkeypatch.setattr("dubins_rrt_ros.planning.search.smoothing.smooth", endlessly)
-    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star", planning_time=0.3, preferred_clearance=0.5))
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star", planning_time=0.6, preferred_clearance=0.5))
     assert result.solved, result.message
 
 

@@ -16,5 +16,6 @@ def how_to_compile() -> str:
     """Return what to do where the kernels are interpreted."""
     source = Path(__file__).resolve().parents[3]
     if (source / "setup.py").exists():
-        return f"this is the source folder {source}: start Python in another folder, where it takes the package that is installed"
+        return (f"this is the source folder {source}: start Python in another folder, where it takes the package that is "
+                "installed, or compile the kernels here, by `python setup.py build_ext --inplace`")
     return "install a C compiler and Cython, then this package again"
