@@ -163,8 +163,8 @@ def draw_on(axes: Axes, drawing: Drawing) -> None:
 
 def _failure_mark(x: float | None = None, y: float | None = None, **style: Any) -> Line2D:
     """Return a ring around what keeps a path from being there, which stays in sight; or that of a legend."""
-    place = ([], []) if x is None else ([x], [y])
-    return Line2D(*place, marker="o", linestyle="", color=FAILURE, markerfacecolor="none", markersize=13, markeredgewidth=3,
+    xs, ys = ([], []) if x is None or y is None else ([x], [y])
+    return Line2D(xs, ys, marker="o", linestyle="", color=FAILURE, markerfacecolor="none", markersize=13, markeredgewidth=3,
                   **style)
 
 
