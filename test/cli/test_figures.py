@@ -33,6 +33,11 @@ def test_no_figure_is_drawn_in_vain():
     assert {file.stem for _, file in SHOWN} == set(figures.all_figures())
 
 
+def texts_of(file):
+    """Titles, labels and figures in a picture: matplotlib writes each as a comment beside its outlines."""
+    return re.findall(r"<!-- (.*) -->", file.read_text("utf-8"))
+
+
 @pytest.mark.slow
 @needs_compiled
 def test_the_command_draws_all_figures_in_all_formats(tmp_path, capsys):
@@ -46,6 +51,7 @@ def test_the_command_draws_all_figures_in_all_formats(tmp_path, capsys):
     for name in names:
         assert imread(folder / f"{name}.png").shape[1] > 900
         assert (folder / f"{name}.svg").stat().st_size < 200_000
+        assert texts_of(folder / f"{name}.svg") == texts_of(FIGURES / f"{name}.svg"), "the pages show what the planner did once"
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shapely
 from support.cases import needs_compiled
 
 from dubins_rrt_ros.evaluation.figures import search as figures_search
@@ -30,7 +31,8 @@ def lengths_in(text):
 
 def test_rrt_and_rrt_star_are_drawn_with_the_same_samples_and_their_own_lengths():
     titles, notes = [], []
-    for axes in figures_search.rrt_and_rrt_star().axes:
+    figure = figures_search.rrt_and_rrt_star()
+    for axes in figure.axes:
         titles.append(axes.get_title(loc="left"))
         notes.append(re.findall(r"\d+", axes.texts[0].get_text()))
         path, = lines_of(axes, PATH)
@@ -40,6 +42,18 @@ def test_rrt_and_rrt_star_are_drawn_with_the_same_samples_and_their_own_lengths(
     assert [title.split(":")[0] for title in titles] == ["RRT", "RRT*"]
     assert lengths_in(titles[1]) < lengths_in(titles[0])
     assert notes[0][0] == notes[1][0] and int(notes[0][1]) < int(notes[1][1])
+
+
+def test_in_two_pictures_side_by_side_no_name_is_written_over_a_wall_and_nothing_is_cut_off():
+    figure = figures_search.rrt_and_rrt_star()
+    figure.draw_without_rendering()
+    box = figure.get_tightbbox()
+    assert (box.min >= 0).all() and (box.max <= figure.get_size_inches()).all()
+    maze = figures_search.problem_in(figures_search.MAZE).map
+    for axes in figure.axes:
+        for name in (text for text in axes.texts if text.get_text() in ("start", "goal")):
+            (x0, y0), (x1, y1) = axes.transData.inverted().transform(name.get_window_extent())
+            assert maze.free.covers(shapely.box(x0, y0, x1, y1)), name.get_text()
 
 
 def test_the_informed_search_is_drawn_with_its_first_path_its_final_one_and_its_tree_within_the_bounds():
