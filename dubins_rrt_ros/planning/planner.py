@@ -12,6 +12,7 @@ from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
 from .collision.clearance import ClearanceField
 from .collision.own_test import OwnTest
+from .curves.angles import SAME
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import WholePlans, find_departure
@@ -34,8 +35,6 @@ from .world import World, problem_with_costs, world_of
 
 #: Maximum time between two reports of progress [s].
 REPORT_INTERVAL = 0.05
-#: Poses this close are the same [m, rad]: what lies between them is rounding, of quaternions and the like.
-SAME = 1e-9
 #: Minimum time between two audits of improvements, in times that the last one took: the search has the rest; and where nobody
 #: is told of them and nothing waits for their proof, so that they only matter if the time does not suffice for the last audit.
 AUDIT_INTERVAL, UNHEARD_AUDIT_INTERVAL = 5, 50

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .curves import dubins
-from .curves.angles import heading_error, position_error, wrap
+from .curves.angles import SAME, heading_error, position_error, wrap
 from .curves.path import Path
-from .planner import SAME
 from .problem import Pose, Problem, Waypoint
 
 #: Number of headings that are tried at a waypoint.

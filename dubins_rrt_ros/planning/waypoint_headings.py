@@ -14,9 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from ._kernels import COMPILED
+from .curves.angles import SAME
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime
-from .planner import SAME
 from .problem import Pose, Problem
 from .result import Plan
 from .search.cost import Objective

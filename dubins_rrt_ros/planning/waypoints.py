@@ -17,12 +17,12 @@ from .answer import defect_message, effort, end_clause, not_audited_message
 from .arguments import check_call
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
-from .curves.angles import wrap
+from .curves.angles import SAME, wrap
 from .curves.path import Path
 from .deadline import Deadline, OutOfTime, never
 from .departure import AUDIT_SHARE, MOST_FOR_AUDIT, WholePlans, find_departure
 from .diagnosis.components import are_separated
-from .planner import AUDIT_RESERVE, SAME, plan
+from .planner import AUDIT_RESERVE, plan
 from .problem import Pose, Problem, Waypoint, checked_waypoints, demand_problem
 from .result import Plan, Progress, Status
 from .search.cost import Objective

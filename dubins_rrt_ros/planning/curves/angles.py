@@ -5,6 +5,9 @@ from typing import overload
 
 import numpy as np
 
+#: Poses this close are the same [m, rad]: what lies between them is rounding, of quaternions and the like.
+SAME = 1e-9
+
 
 @overload
 def wrap(angle: float) -> float: ...
