@@ -15,7 +15,7 @@ from dubins_rrt_ros.planning import OptionError, Problem, Settings, Thresholds, 
 from dubins_rrt_ros.planning.maps.files import MAX_CELLS, UNKNOWN_GREY
 from dubins_rrt_ros.planning.option import Option, convert_options, option
 from dubins_rrt_ros.planning.text import quoted_name
-from dubins_rrt_ros.planning.vehicle import OVERRIDING, overridden
+from dubins_rrt_ros.planning.vehicle import OVERRIDING, overridden, without_overridden
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def configuration(values: Mapping[str, Any]) -> Configuration:
     """
     node, vehicle, problem, settings = (
         {item.name: item.convert(values[item.name]) for item in options(cls)} for cls in CLASSES)
-    return Configuration(NodeOptions(**node), Vehicle(**vehicle), Settings(**settings), problem)
+    return Configuration(NodeOptions(**node), Vehicle(**without_overridden(vehicle)), Settings(**settings), problem)
 
 
 def descriptor(item: Option) -> ParameterDescriptor:

@@ -250,7 +250,7 @@ def _smaller(vehicle: Vehicle, depth: float) -> Vehicle | None:
     outline = shapely.buffer(shapely.Polygon(vehicle.footprint), -depth, join_style="mitre")
     if outline.geom_type != "Polygon" or outline.is_empty:
         return None
-    return replace(vehicle, footprint=tuple((x, y) for x, y in outline.exterior.coords[:-1]))
+    return Vehicle.from_footprint([(x, y) for x, y in outline.exterior.coords[:-1]], turning_radius=vehicle.turning_radius)
 
 
 def _depth(problem: Problem, field: ClearanceField) -> float:

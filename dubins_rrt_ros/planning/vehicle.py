@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -27,6 +28,10 @@ _CORNER = re.compile(rf"\[{_NUMBER},{_NUMBER}(?:,\s*)?\]", re.ASCII)
 _OUTLINE = re.compile(rf"\s*\[\s*(?:{_CORNER.pattern}\s*,\s*)*(?:{_CORNER.pattern}\s*)?\]\s*", re.ASCII)
 
 
+class DoubtfulVehicle(UserWarning):
+    """A warning: a size of a vehicle that has no effect, as another one takes its place."""
+
+
 #: Options that take the place of others.
 OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius"}
 
@@ -34,6 +39,12 @@ OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius"}
 def overridden(given: Mapping[str, Any]) -> dict[str, str]:
     """Return which of the options that were given have no effect, each with the given one that takes its place."""
     return {name: by for by, name in OVERRIDING.items() if name in given and _is_set(given.get(by))}
+
+
+def without_overridden(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options that were given but for those in whose place another one is used."""
+    dropped = overridden(given)
+    return {name: value for name, value in given.items() if name not in dropped}
 
 
 def _is_set(value: Any) -> bool:
@@ -104,7 +115,8 @@ class Vehicle:
     "[[x, y], ...]", too, and is held counter-clockwise. Where it covers no disc around the reference point, such as a trailer's
     hitch, lower bounds are those without obstacles, and it is not proved that there is no path. A `wheelbase` L and a
     `max_steering_angle` phi, set together, determine the turning radius, L / tan(phi) (the paper's equation 1). `from_footprint`
-    and `from_wheelbase` say so by their names.
+    and `from_wheelbase` say so by their names. A radius that is given beside what it is derived from has no effect, of which a
+    `UserWarning` tells.
 
     Raises:
         OptionError: an option is of the wrong type or out of range, the footprint is no polygon, or one of
@@ -128,10 +140,10 @@ class Vehicle:
             raise OptionError(f"wheelbase is {self.wheelbase:g} m and max_steering_angle {self.max_steering_angle:g} rad; "
                               "set both at once, or neither and turning_radius")
         if self.wheelbase > 0:
-            self._derive("turning_radius", self.wheelbase / math.tan(self.max_steering_angle), f"wheelbase {self.wheelbase:g} m "
+            self._derive("wheelbase", self.wheelbase / math.tan(self.max_steering_angle), f"wheelbase {self.wheelbase:g} m "
                          f"and max_steering_angle {self.max_steering_angle:g} rad make a turning radius of")
         if self.footprint:
-            self._derive("robot_radius", max(math.hypot(x, y) for x, y in self.footprint), "footprint has its farthest corner at")
+            self._derive("footprint", max(math.hypot(x, y) for x, y in self.footprint), "footprint has its farthest corner at")
 
     @classmethod
     def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = 0.2,
@@ -189,9 +201,14 @@ class Vehicle:
         inscribed = self.inscribed_radius
         return self.turning_radius if self.turning_radius >= inscribed else 2 * inscribed
 
-    def _derive(self, name: str, value: float, what: str) -> None:
-        derived = next(item for item in options(Vehicle) if item.name == name)
+    def _derive(self, by: str, value: float, what: str) -> None:
+        """Set the radius in whose place another option is used; warn of one that was given, which its default does not tell."""
+        derived = next(item for item in options(Vehicle) if item.name == OVERRIDING[by])
+        given = getattr(self, derived.name)
         try:
-            object.__setattr__(self, name, derived.convert(value))
+            object.__setattr__(self, derived.name, derived.convert(value))
         except OptionError:
             raise OptionError(f"{what} {value:.6g} m; that may be {derived.allowed()}") from None
+        if given != derived.default and not math.isclose(given, value):
+            warnings.warn(f"{derived.name} {given:g} m has no effect, as {by} takes its place: it is {value:.6g} m",
+                          DoubtfulVehicle, stacklevel=4)  # of the call of the constructor, which a dataclass writes

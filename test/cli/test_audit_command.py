@@ -90,6 +90,14 @@ def test_flags_replace_what_a_plan_says_of_the_vehicle(document, capsys):
     assert status == 0 and "robot radius of 0.25 m" in out and "turning radius of 1 m" in out
 
 
+def test_a_flag_that_another_one_overrides_is_told(document, capsys):
+    both = ("--robot-radius", "0.1", "--footprint", FOOTPRINT)
+    for file in (write(document), write(poses(), "poses.json")):
+        status, out, error = run(file, "hall.wkt", *both, capsys=capsys)
+        assert status == 0 and "of its footprint" in out
+        assert error == "dubins_rrt audit: warning: --robot-radius has no effect, as --footprint takes its place\n"
+
+
 def test_a_plan_is_judged_on_the_map_that_is_given(document, capsys):
     Path("other.wkt").write_text((HALL - shapely.box(4, 6, 7, 10)).wkt)
     status, out, _ = run(write(document), "other.wkt", capsys=capsys)

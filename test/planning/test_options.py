@@ -135,7 +135,7 @@ def test_options_are_frozen():
 def test_turning_radius_of_a_wheelbase():
     vehicle = Vehicle(wheelbase=2.7, max_steering_angle=0.6)
     assert vehicle.turning_radius == pytest.approx(2.7 / math.tan(0.6))
-    assert Vehicle(turning_radius=5.0, wheelbase=1, max_steering_angle=math.pi / 4).turning_radius == pytest.approx(1)
+    assert Vehicle(wheelbase=1, max_steering_angle=math.pi / 4).turning_radius == pytest.approx(1)
 
 
 @pytest.mark.parametrize("half", [{"wheelbase": 2.7}, {"max_steering_angle": 0.6}])

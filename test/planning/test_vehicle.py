@@ -1,15 +1,24 @@
 """The vehicle: what is derived from its dimensions, and what is refused."""
 
 import math
+import pickle
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dubins_rrt_ros.planning import OptionError, Vehicle, values
+from dubins_rrt_ros.planning import GridMap, OptionError, Problem, Settings, Vehicle, plan, values
+from dubins_rrt_ros.planning.vehicle import DoubtfulVehicle
+
+#: A wall behind the start.
+WALL = np.zeros((40, 40), np.int8)
+WALL[10:30, 2:4] = 100
+SQUARE = ((0.3, -0.4), (0.3, 0.4), (-0.3, 0.4), (-0.3, -0.4))
 
 
 def test_the_steering_determines_the_turning_radius():
-    assert Vehicle(turning_radius=7.0, wheelbase=2.0, max_steering_angle=0.5).turning_radius == 2.0 / math.tan(0.5)
+    assert Vehicle(wheelbase=2.0, max_steering_angle=0.5).turning_radius == 2.0 / math.tan(0.5)
 
 
 @pytest.mark.parametrize("half", [{"wheelbase": 2.0}, {"max_steering_angle": 0.5}])
@@ -19,8 +28,39 @@ def test_half_of_the_steering_is_refused(half):
 
 
 def test_the_disc_of_a_footprint_covers_it():
-    vehicle = Vehicle(robot_radius=0.1, footprint="[[3, 0.9], [3, -0.9], [-1, -0.9], [-1, 0.9]]")
+    vehicle = Vehicle(footprint="[[3, 0.9], [3, -0.9], [-1, -0.9], [-1, 0.9]]")
     assert vehicle.robot_radius == math.hypot(3, 0.9)
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: Vehicle(footprint=SQUARE, robot_radius=0.9),
+     "robot_radius 0.9 m has no effect, as footprint takes its place: it is 0.5 m"),
+    (lambda: Vehicle(turning_radius=7.0, wheelbase=2.0, max_steering_angle=math.pi / 4),
+     "turning_radius 7 m has no effect, as wheelbase takes its place: it is 2 m"),
+    (lambda: Vehicle.from_wheelbase(2.0, 0.5, robot_radius=0.9, footprint=SQUARE), "robot_radius 0.9 m has no effect"),
+    (lambda: replace(Vehicle(footprint=SQUARE), robot_radius=0.4), "robot_radius 0.4 m has no effect")])
+def test_a_radius_in_whose_place_another_size_is_used_is_warned_of(make, said):
+    with pytest.warns(DoubtfulVehicle, match=said) as told:
+        make()
+    assert len(told) == 1
+
+
+def test_a_radius_that_is_the_derived_one_or_was_not_given_is_not_warned_of():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        car = Vehicle.from_wheelbase(2.0, 0.5, footprint=SQUARE)
+        assert Vehicle(**values(car)) == replace(car) == pickle.loads(pickle.dumps(car)) == car
+        assert Vehicle(robot_radius=0.9, footprint=()).robot_radius == 0.9
+        assert replace(Vehicle(), footprint=SQUARE).robot_radius == 0.5
+        leaving = plan(Problem(GridMap(WALL, 0.1, (0.0, 0.0, 0.0)), Vehicle(0.5, footprint=SQUARE),
+                               (0.69, 2.0, 0.0), (3.5, 2.0, 0.0), start_slack=0.1), Settings(planner="rrt"))
+        assert leaving.solved and leaving.start_too_near
+
+
+def test_the_place_of_the_warning_is_that_of_the_call():
+    with pytest.warns(DoubtfulVehicle) as told:
+        Vehicle(footprint=SQUARE, robot_radius=0.9)
+    assert told[0].filename == __file__
 
 
 def test_a_vehicle_is_made_again_from_its_values():

@@ -11,7 +11,7 @@ from dubins_rrt_ros.planning import InvalidPose, OptionError, Pose, Problem, Set
 from dubins_rrt_ros.planning.maps.frame import doubt_about_yaw
 from dubins_rrt_ros.planning.maps.locate import installed_map, no_folder
 from dubins_rrt_ros.planning.text import one_line, quoted
-from dubins_rrt_ros.planning.vehicle import overridden
+from dubins_rrt_ros.planning.vehicle import overridden, without_overridden
 
 from ..common.documents import read_json
 from ..common.parser import UsageError, near_miss
@@ -118,7 +118,7 @@ def _case(entry: Any, folder: Path, where: str) -> Case:
                                   "its name is relative to the file of problems, or that of an installed map, such as maze"))
     _check_keys(entry, where)
     try:
-        vehicle = Vehicle(**dict(_given(Vehicle, entry)))
+        vehicle = Vehicle(**without_overridden(dict(_given(Vehicle, entry))))
         return Case(entry["name"], map_file, vehicle, _pose("start", entry["start"]), _pose("goal", entry["goal"]),
                     _given(Problem, entry), _given(Settings, entry))
     except (OptionError, InvalidPose) as error:

@@ -1,6 +1,7 @@
 """The library's options as flags of the command line."""
 
 import argparse
+import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.option import Option
 from dubins_rrt_ros.planning.settings import PAPER, SHORTEST, preferred_clearance_option
+from dubins_rrt_ros.planning.vehicle import Vehicle, overridden, without_overridden
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,15 @@ def _keywords(item: Option) -> dict[str, Any]:
 def given_options(arguments: argparse.Namespace, cls: type) -> dict[str, Any]:
     """Return the options of `cls` that were given on the command line, by name."""
     return {item.name: getattr(arguments, item.name) for item in options(cls) if item.name in arguments}
+
+
+def given_vehicle(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of `Vehicle` that were given on the command line but those that have no effect, which it warns of."""
+    given = given_options(arguments, Vehicle)
+    for name, by in overridden(given).items():
+        print(f"dubins_rrt {arguments.command}: warning: {flag(name)} has no effect, as {flag(by)} takes its place",
+              file=sys.stderr)
+    return without_overridden(given)
 
 
 def flag(name: str) -> str:

@@ -103,4 +103,4 @@ def _slimmer(vehicle: Vehicle) -> Vehicle:
     inner = shapely.Polygon(vehicle.footprint).buffer(-math.sqrt(2) * CLEARANCE_MARGIN, join_style="mitre")
     if not isinstance(inner, shapely.Polygon) or inner.is_empty:
         return vehicle  # as thin as that
-    return replace(vehicle, footprint=shapely.get_coordinates(inner.exterior)[:-1].tolist())
+    return Vehicle.from_footprint(shapely.get_coordinates(inner.exterior)[:-1].tolist(), turning_radius=vehicle.turning_radius)
