@@ -96,6 +96,19 @@ def _demand(holds: Any, otherwise: str) -> None:
         raise Refused(otherwise)
 
 
+def _place(world: World, point: np.ndarray) -> list[float]:
+    """Return x and y of a point of the map's own frame in that of the poses, as messages have them [m]."""
+    x, y, yaw = world.origin
+    c, s = math.cos(yaw), math.sin(yaw)
+    return [round(x + c * float(point[0]) - s * float(point[1]), 3), round(y + s * float(point[0]) + c * float(point[1]), 3)]
+
+
+def _demand_each(world: World, holds: np.ndarray, points: np.ndarray, otherwise: str) -> None:
+    """Demand something of each of some points of the map's own frame; the place of the first without it is told."""
+    if len(missing := np.flatnonzero(~holds)):
+        raise Refused(f"{otherwise} at {_place(world, points[missing[0]])}")
+
+
 def _check_path(document: dict[str, Any], world: World) -> None:
     """Refuse a path that the vehicle cannot drive from the start to the goal, or that is longer than claimed."""
     request, length, path = document["request"], document["length"], document["path"]
@@ -119,7 +132,7 @@ def _check_path(document: dict[str, Any], world: World) -> None:
     for edge in range(len(outline)):
         swept = np.concatenate([corners[:-1, (edge, edge - 1)], corners[1:, (edge, edge - 1)]], axis=1)
         for hit in world.touched(shapely.convex_hull(shapely.multipoints(swept)), wider + SAGITTA):
-            raise Refused(f"the vehicle comes too near to an obstacle at {poses[hit, :2].round(3).tolist()}")
+            raise Refused(f"the vehicle comes too near to an obstacle at {_place(world, poses[hit])}")
 
 
 def _poses(start: tuple[float, float, float], path: list[Any], reach: float) -> np.ndarray:
@@ -174,18 +187,20 @@ class _Bound:
     def _check_squares(self) -> None:
         """Show that no cost rises by more than a metre a metre, and that nothing free touches the squares that have costs."""
         squares, half = self._squares, self._squares.side / 2
+        middles = squares.corner + squares.side * (np.argwhere(squares.domain)[:, ::-1] + 0.5)
         for which in (FROM_START, TO_GOAL):
             slopes = np.linalg.norm(gradients(squares.triangles(which, *np.nonzero(squares.domain))), axis=-1)
-            _demand(np.all(slopes <= squares.side * (1 - 5e-11)), "a potential is steeper than 1")
+            is_flat = np.all(slopes <= squares.side * (1 - 5e-11), axis=1)
+            _demand_each(self._world, is_flat, middles, "a potential is steeper than 1")
         around = np.pad(squares.domain, 2)
         near = np.lib.stride_tricks.sliding_window_view(around, (3, 3)).any(axis=(2, 3)) & ~around[1:-1, 1:-1]
         points = squares.corner + squares.side * (np.argwhere(near)[:, ::-1] - 0.5)
         for _ in range(SQUARE_HALVINGS):
             room = self._room(points)
-            _demand(np.all(room < self._inner), "the vehicle may be outside of all squares")
+            _demand_each(self._world, room < self._inner, points, "the vehicle may be outside of all squares")
             points, half = points[room + half * math.sqrt(2) >= self._inner], half / 2
             points = (points[:, None] + half * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])).reshape(-1, 2)
-        _demand(not len(points), "the vehicle may be outside of all squares")
+        _demand_each(self._world, np.zeros(len(points), bool), points, "the vehicle may be outside of all squares")
 
     def _room(self, points: np.ndarray) -> np.ndarray:
         return self._world.clearances(points, self._inner) + self._margin
@@ -220,12 +235,12 @@ class _Bound:
         boxes = boxes_on(gates[gate], table, self._margin)
         closed = np.isnan(boxes[:, 8])
         room = self._room(boxes[closed, :2]) + boxes[closed, 4]
-        _demand(np.all(room < self._inner), "a box that may be free has no potential")
+        _demand_each(self._world, room < self._inner, boxes[closed], "a box that may be free has no potential")
         found: dict[Portal, list[np.ndarray]] = {key: [] for key in used_portals(set(keys), start, goals)}
         for number, key in enumerate(keys):
             if key in found:
                 mine = np.flatnonzero(gate == number)
-                _demand(_covers(table[mine]), f"boxes do not cover a level at {gates[number, :2].round(3).tolist()}")
+                _demand(_covers(table[mine]), f"boxes do not cover a level at {_place(self._world, gates[number])}")
                 found[key].append(boxes[mine[~closed[mine]]])
         return {key: np.concatenate(some) for key, some in found.items()}
 
@@ -241,8 +256,10 @@ class _Bound:
             if not is_first:
                 boxes = boxes[excess > 0]
                 excess = np.max([too_high(some, boxes, self._radius, self._margin) for some in ahead], axis=0, initial=0)
-            worst = excess.max(initial=0)
-            _demand(worst == 0, f"a potential is {worst:.3g} m higher than those before it allow")
+            if excess.max(initial=0):
+                worst = np.argmax(excess)
+                raise Refused(f"the potential at {_place(self._world, boxes[worst])} is {boxes[worst, 8]:.6g} m, "
+                              f"{excess[worst]:.3g} m higher than those before it allow")
 
 
 def goal_boxes(goal: tuple[float, float, float], tolerance: float, turn: float, bound: float) -> np.ndarray:

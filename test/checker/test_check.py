@@ -14,7 +14,7 @@ from support.spoils import SPOILS, Drive
 from dubins_rrt_ros.checker.check import Refused, boxes_on, check, goal_boxes
 from dubins_rrt_ros.checker.levels import FROM_START, Squares
 from dubins_rrt_ros.checker.maps import UnreadableMap
-from dubins_rrt_ros.planning import Problem, Vehicle
+from dubins_rrt_ros.planning import Problem, Vehicle, load_map
 from dubins_rrt_ros.planning.certificate.certificate import CertificateError, write_certificate
 
 CAR = Vehicle(turning_radius=0.6, robot_radius=0.2)
@@ -60,6 +60,24 @@ def test_plain_json_will_do(tmp_path):
     ("box closed", "may be free has no potential"), ("cell parted", "two cells meet")])
 def test_the_refusal_says_what_does_not_hold(kind, said, tmp_path):
     assert said in refusal(spoilt(kind, tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize(("kind", "off"), [
+    ("bound above the path", 0.001), ("potential above the path", 0.05), ("2 mm too near", 0.01), ("wall added", 0.01),
+    ("box dropped", 0.1), ("box closed", 0.05), ("node raised", 0.4), ("square left out", 0.4)])
+def test_the_refusal_says_where_in_the_frame_of_the_poses(kind, off, tmp_path):
+    """And not in that of the map, whose origin is turned and off by metres."""
+    said = refusal(spoilt(kind, tmp_path), tmp_path)
+    place = json.loads(re.search(r" at (\[.*?\])", said)[1])
+    path = load_map(TURNED.file).to_map_frame(Drive.of(TURNED).poses[:, :2])
+    assert np.hypot(*(path - place).T).min() < off
+
+
+def test_a_potential_that_is_too_high_is_told_with_place_and_figures(tmp_path):
+    said = refusal(spoilt("bound above the path", tmp_path), tmp_path)
+    bound, place = 1.0001 * TURNED.document["length"], [round(at, 3) for at in TURNED.document["request"]["goal"][:2]]
+    figures = re.escape(f"the potential at {place} is {bound:.6g} m, ") + r"0\.\d+ m higher than those before it allow"
+    assert re.fullmatch(figures, said)
 
 
 def test_another_map_is_refused(tmp_path):

@@ -169,7 +169,7 @@ def test_no_square_with_a_free_place_may_be_left_out(name, tmp_path):
         free = list(document["squares"]["free"])
         free[row] = free[row][:column] + "0" + free[row][column + 1:]
         changed = document | {"squares": document["squares"] | {"free": free}}
-        assert verdict(changed, certified.file, tmp_path) == "the vehicle may be outside of all squares"
+        assert "the vehicle may be outside of all squares at [" in verdict(changed, certified.file, tmp_path)
 
 
 def test_no_box_with_a_free_place_goes_without_a_potential(tmp_path):
@@ -184,7 +184,7 @@ def test_no_box_with_a_free_place_goes_without_a_potential(tmp_path):
                 boxes = list(certified.document["boxes"])
                 boxes[number] = [[-1, 1, -1, 1, None]]
                 said = verdict(certified.document | {"boxes": boxes}, certified.file, tmp_path)
-                assert said == "a box that may be free has no potential"
+                assert said.startswith("a box that may be free has no potential at [")
                 judged += 1
     assert judged >= 4
 
