@@ -11,6 +11,8 @@ from support.planner_cases import GOAL, START, VEHICLE, assert_refused, hard_to_
 
 from dubins_rrt_ros.planning import GridMap, Path, Problem, Status, Tree, audit_path, load_map, plan, prepare
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
+from dubins_rrt_ros.planning.search.cost import Objective
+from dubins_rrt_ros.planning.search.hybrid_astar import HybridAStarRuns
 from dubins_rrt_ros.planning.search.rrt import Search
 from dubins_rrt_ros.planning.search.smoothing import smooth
 from dubins_rrt_ros.planning.work import Work
@@ -59,6 +61,46 @@ def test_a_path_is_audited_before_time_is_spent_on_its_better_forms(monkeypatch)
     monkeypatch.setattr("dubins_rrt_ros.planning.search.smoothing.smooth", endlessly)
     result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings("rrt_star", planning_time=0.6, preferred_clearance=0.5))
     assert result.solved, result.message
+
+
+def test_nothing_is_kept_back_of_a_time_that_is_over(planner, monkeypatch):
+    """Of a path that comes 4 ms late no better form is sought: only what is nearly done then goes on, and the audit."""
+    now, smoothed, run = [0.0], [], HybridAStarRuns.run
+
+    def late(*arguments):
+        path = run(*arguments)
+        now[0] += 1.004 if path else 0.0
+        return path
+
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(HybridAStarRuns, "run", late)
+    monkeypatch.setattr("dubins_rrt_ros.planning.search.smoothing.smooth", lambda path, *_: smoothed.append(path) or path)
+    result = plan(Problem(empty_map(), VEHICLE, START, GOAL), settings(planner, planning_time=1.0, preferred_clearance=0.0))
+    assert result.solved and smoothed == []
+
+
+@needs_compiled
+@pytest.mark.parametrize("what", ["tree", "cost"])
+def test_the_time_that_is_kept_for_the_audit_includes_what_goes_with_it(what, monkeypatch):
+    """The search ends so early that the tree and the cost of its path, of which one takes 10 s, are there in time."""
+    looks, took, is_cost_due, tree_with, path_cost = itertools.count(), [], [], Search.tree_with, Objective.path_cost
+
+    def tree_slowly(search, path):
+        (took if what == "tree" else is_cost_due).append(10.0)
+        return tree_with(search, path)
+
+    def cost_slowly(objective, path):
+        took.extend(is_cost_due[:1])  # only the cost that goes with a tree, and not those that the search asks for
+        is_cost_due.clear()
+        return path_cost(objective, path)
+
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda: 0.002 * next(looks) + sum(took))
+    monkeypatch.setattr(Search, "tree_with", tree_slowly)
+    monkeypatch.setattr(Objective, "path_cost", cost_slowly)
+    result = plan(Problem(walled_with_a_gap(), VEHICLE, START, GOAL),
+                  settings("rrt_star", samples=1_000_000, planning_time=40.0, preferred_clearance=0.0))
+    assert result.solved and len(took) > 1
+    assert result.planning_time <= 40.0
 
 
 def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
