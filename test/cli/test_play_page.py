@@ -116,8 +116,12 @@ def is_like(colour, wanted, most=40):
 ORANGE, WHITE, WALL = (0xd5, 0x5e, 0x00), (255, 255, 255), (70, 70, 70)
 
 
-def test_on_a_small_screen_the_legend_covers_no_map(page):
-    assert page.find("#legend").is_displayed()
+def test_the_legend_covers_no_map_and_is_not_there_on_a_small_screen(page):
+    for size in ((1280, 720), (900, 700)):
+        page.browser.set_window_size(*size)
+        assert page.find("#legend").is_displayed()
+        canvas, legend = page.find("#canvas").rect, page.find("#legend").rect
+        assert canvas["y"] + canvas["height"] <= legend["y"] + 1 < page.find("main").rect["height"]  # which are rounded
     for size in ((640, 450), (1280, 520)):
         page.browser.set_window_size(*size)
         page.wait_for("a hidden legend", lambda: not page.find("#legend").is_displayed())
@@ -129,6 +133,17 @@ def test_it_opens_with_a_path_in_the_picture(page):
     assert is_like(page.colour_at(*path[len(path) // 2][:2]), ORANGE)
     assert is_like(page.colour_at(7.5, 11.0), WHITE) and is_like(page.colour_at(3.12, 3.0), WALL)
     assert page.script("return window.dubins.view.tree.length") > 100
+
+
+@pytest.mark.parametrize("way", [1, -1], ids=["up", "down"])
+def test_the_name_of_the_goal_does_not_cover_the_path_to_it(way, page):
+    page.drag(page.on_screen(*page.pose("goal")[:2]), page.on_screen(13.5, 9.0))  # where there is room to turn round
+    x, y, _ = page.pose("goal")
+    page.drag(page.tip("goal"), page.on_screen(x, y + way))
+    page.wait_for("a path in this heading", lambda: page.path() and way * math.sin(page.path()[-1][2]) > 0.99)
+    apart = 20 / page.script("return window.dubins.view.scale")  # where the name would be [m]
+    place = next(pose[:2] for pose in reversed(page.path()) if math.dist(pose[:2], (x, y)) > apart)
+    assert is_like(page.colour_at(*place), ORANGE)
 
 
 def test_the_path_follows_the_goal_while_it_is_dragged(page):

@@ -254,11 +254,13 @@ export class View {
       context.lineWidth = 1.5 * pixel;
       context.stroke();
     }
-    this.write(name, pose[0], pose[1], colour);
+    const isUp = tip[1] >= pose[1];  // behind the start and ahead of the goal no path runs
+    if (name === "goal") { this.write(name, ...tip, colour, isUp); } else { this.write(name, pose[0], pose[1], colour, !isUp); }
     context.globalAlpha = 1;
   }
 
-  write(text, x, y, colour) {
+  // Write below a place, or above it.
+  write(text, x, y, colour, isAbove = false) {
     const { context } = this, [column, row] = this.toScreen(x, y), ratio = window.devicePixelRatio || 1;
     context.save();
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -266,9 +268,10 @@ export class View {
     context.textAlign = "center";
     context.lineWidth = 4;
     context.strokeStyle = "#ffffff";
-    context.strokeText(text, column, row + 26);
+    const line = row + (isAbove ? -16 : 26);
+    context.strokeText(text, column, line);
     context.fillStyle = colour;
-    context.fillText(text, column, row + 26);
+    context.fillText(text, column, line);
     context.restore();
   }
 
