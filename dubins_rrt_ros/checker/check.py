@@ -1,17 +1,13 @@
 """Check a certificate: that its path can be driven, and that no path is shorter than its bound (`docs/proof.md`)."""
 
-import gzip
-import io
 import json
 import math
-import os
-import stat
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .bounds import part, too_high
 from .levels import FROM_START, TO_GOAL, Squares, gradients
@@ -21,34 +17,35 @@ from .maps import World, read_map
 END, SAGITTA = 1e-6, 1e-6
 #: Allowance for rounding, as a share of all lengths: some thousand times what the formulas lose.
 MARGIN = 1e-11
-#: Version of the certificates that are checked, the greatest size of one [bytes], and the greatest number of poses of its path.
-VERSION, MOST_BYTES, MOST_POSES = 1, 2**28, 10**7
-#: What reading a file raises that is no certificate.
-_MALFORMED = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError, MemoryError, EOFError,
-              gzip.BadGzipFile, zlib.error, shapely.errors.ShapelyError)
+#: Version of the certificates that are checked, and the greatest number of poses of a path.
+VERSION, MOST_POSES = 1, 10**7
+#: What is said of a document that is no certificate, and what reading it raises.
+NO_CERTIFICATE = "the file is not as certificates are, which `dubins_rrt certify` writes"
+_MALFORMED = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError, MemoryError,
+              shapely.errors.ShapelyError)
 #: Greatest range of headings [rad] of the boxes into which those of the goal are cut, and greatest number of boxes across it.
 GOAL_TURN, GOAL_PARTS = 0.1, 8
 #: Number of times that a square is halved at most, both ways, to show that the vehicle's disc cannot be there.
 SQUARE_HALVINGS = 12
 #: The arcs of a path, and which way they turn.
 TURNS = {"L": 1, "S": 0, "R": -1}
-#: The cells before and after a crossing of a level.
-Portal = tuple[int, int]
+#: What stands for the cells from which a path comes to its start, and to which it goes from the goal.
+BEFORE, AFTER = -1, -2
 
 
 class Refused(Exception):
     """A certificate that does not hold; the message says what does not."""
 
 
-def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
-    """Return the claims of a certificate, if they hold.
+def check(certificate: bytes, map_path: str | Path) -> dict[str, Any]:
+    """Return the claims of a certificate, by its JSON, if they hold.
 
     Raises:
-        Refused: they do not, or the file is no certificate.
-        UnreadableMap, OSError: a file cannot be read.
+        Refused: they do not, or it is no certificate.
+        UnreadableMap, OSError: the map cannot be read.
     """
     try:
-        document = json.loads(_read(certificate), parse_float=_finite, parse_constant=_finite)
+        document = json.loads(certificate, parse_float=_finite, parse_constant=_finite)
         _check_numbers(document)
         world = read_map(map_path, bool(document["map"]["allow_unknown"]))
         _demand(document["map"] == world.description | {"allow_unknown": document["map"]["allow_unknown"]},
@@ -56,32 +53,19 @@ def check(certificate: str | Path, map_path: str | Path) -> dict[str, Any]:
         _check_path(document, world)
         _Bound(document, world).check()
     except _MALFORMED as error:
-        raise Refused("the file is not as certificates are, which `dubins_rrt certify` writes: "
-                      f"{type(error).__name__}: {str(error)[:200]}") from None
+        raise Refused(f"{NO_CERTIFICATE}: {type(error).__name__}: {str(error)[:200]}") from None
     return {name: document[name] for name in ("request", "length", "bound")}
-
-
-def _read(certificate: str | Path) -> bytes:
-    """Return the JSON of a certificate; the file may be a pipe or a device, and expand to more than there is memory for."""
-    descriptor = os.open(certificate, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to is not waited for
-    os.set_blocking(descriptor, True)
-    with open(descriptor, "rb") as file:
-        data = file.read(-1 if stat.S_ISREG(os.fstat(descriptor).st_mode) else MOST_BYTES)
-    text = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MOST_BYTES) if data[:2] == b"\x1f\x8b" else data
-    _demand(len(text) < MOST_BYTES, f"the file has {MOST_BYTES} bytes or more")
-    return text
 
 
 def _check_numbers(document: Any) -> None:
     """Refuse a document of another version, and numbers with which an inequality would hold that says nothing."""
-    request, version = document["request"], document["certificate"]
+    request, version, outline = document["request"], document["certificate"], document["request"]["footprint"]
     _demand(version == VERSION and type(version) is int, f"it is of version {version!r:.50}; version {VERSION} can be checked")
-    sizes = ("turning_radius", "robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw")
-    numbers = {name: document[name] for name in ("length", "bound", "limit")} | {name: request[name] for name in sizes}
-    for name, number in numbers.items():
+    sizes = {name: request[name] for name in ("turning_radius", "robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw")}
+    for name, number in (sizes | {name: document[name] for name in ("length", "bound", "limit")}).items():
         _demand(type(number) in (int, float), f"{name} is {number!r:.50}, which is no number")
+    _demand(sizes["turning_radius"] > 0 and min(sizes.values()) >= 0, "the vehicle or a tolerance has a size below 0")
     _demand(type(document["map"]["allow_unknown"]) is bool, "allow_unknown is neither true nor false")
-    outline = request["footprint"]
     _demand(not outline or shapely.is_valid(shapely.Polygon(outline)), "the footprint crosses itself")
 
 
@@ -112,8 +96,6 @@ def _demand_each(world: World, holds: np.ndarray, points: np.ndarray, otherwise:
 def _check_path(document: dict[str, Any], world: World) -> None:
     """Refuse a path that the vehicle cannot drive from the start to the goal, or that is longer than claimed."""
     request, length, path = document["request"], document["length"], document["path"]
-    sizes = [request[name] for name in ("robot_radius", "goal_tolerance_xy", "goal_tolerance_yaw")]
-    _demand(request["turning_radius"] > 0 and min(sizes) >= 0, "the vehicle or a tolerance has a size below 0")
     can = [word in TURNS and metres >= 0 and radius >= request["turning_radius"] * (1 - END) for word, radius, metres in path]
     _demand(all(can), "the path turns tighter than the vehicle can, or drives backwards")
     own = sum(metres for _, _, metres in path)
@@ -167,7 +149,7 @@ class _Bound:
         if not self._document["levels"]:
             # Of a limit far below 0 the margin would excuse any bound.
             _demand(self._document["limit"] >= max(0, self._bound), "the limit is below the bound")
-            return self._check_edges({}, 0, {0}, math.inf)
+            return self._check_steps(np.array([[False, True], [False, False]]), [self._start_box, self._goal_boxes], math.inf)
         squares = self._squares = Squares(self._document)
         _demand(squares.side > 0, "the squares have no size")
         _demand(np.all(np.diff(squares.levels) > 0) and not np.isin(squares.costs[FROM_START], squares.levels).any(),
@@ -182,7 +164,7 @@ class _Bound:
         self._find_cells()
         (start,), self._start_box[:, 9] = self._cells_at(self._start, 0.0)
         goals, self._goal_boxes[:, 9] = self._cells_at(self._goal, self._tolerance)
-        return self._check_edges(self._portals(start, goals), start, goals, enough)
+        return self._check_gates(start, goals, enough)
 
     def _check_squares(self) -> None:
         """Show that no cost rises by more than a metre a metre, and that nothing free touches the squares that have costs."""
@@ -193,7 +175,7 @@ class _Bound:
             is_flat = np.all(slopes <= squares.side * (1 - 5e-11), axis=1)
             _demand_each(self._world, is_flat, middles, "a potential is steeper than 1")
         around = np.pad(squares.domain, 2)
-        near = np.lib.stride_tricks.sliding_window_view(around, (3, 3)).any(axis=(2, 3)) & ~around[1:-1, 1:-1]
+        near = sliding_window_view(around, (3, 3)).any(axis=(2, 3)) & ~around[1:-1, 1:-1]
         points = squares.corner + squares.side * (np.argwhere(near)[:, ::-1] - 0.5)
         for _ in range(SQUARE_HALVINGS):
             room = self._room(points)
@@ -211,9 +193,9 @@ class _Bound:
         _demand(named.shape == (parts.sum(),) and named.min(initial=0) >= 0, "the cells do not fit the corridor")
         cells = self._cells = np.full(parts.shape, -1)  # where there is none
         cells[parts] = named
-        for one, other in ((cells[:, :-1], cells[:, 1:]), (cells[:, :, :-1], cells[:, :, 1:]),
-                           (cells[:, :-1, :-1], cells[:, 1:, 1:]), (cells[:, :-1, 1:], cells[:, 1:, :-1])):
-            _demand(np.all((one == other) | (one < 0) | (other < 0)), "two cells meet within a slab")
+        meeting = sliding_window_view(np.pad(cells, ((0, 0), (0, 1), (0, 1)), constant_values=-1), (2, 2), axis=(1, 2))
+        is_one = (meeting == meeting.max(axis=(3, 4), keepdims=True)) | (meeting < 0)
+        _demand(is_one.all(), "two cells meet within a slab")
 
     def _cells_at(self, pose: tuple[float, float, float], tolerance: float) -> tuple[set[int], float]:
         """Return the cells that may hold a place that is as near to a pose [m], and the cost there if it is the only one."""
@@ -225,40 +207,35 @@ class _Bound:
         _demand(is_inside, "an end is not inside a slab")
         return {int(self._cells[int(self._squares.slabs(cost)), *square])}, cost
 
-    def _portals(self, start: int, goals: set[int]) -> dict[Portal, np.ndarray]:
-        """Return the boxes of all portals that a path may come through, those that may be free, after showing that they cover."""
+    def _check_gates(self, start: int, goals: set[int], enough: float) -> None:
+        """Show that boxes cover the gates of all ways from the start's cell to the goal's, and that their potentials hold."""
         gates, *parts = self._squares.gates()
-        rows, keys = self._document["boxes"], list(zip(*(self._cells[*some.T].tolist() for some in parts), strict=True))
+        crossings, portal = np.unique(np.column_stack([self._cells[*some.T] for some in parts]), axis=0, return_inverse=True)
+        rows = self._document["boxes"]
         gate = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
         table = np.array([row for some in rows for row in some], dtype=float).reshape(-1, 5)
-        _demand(len(rows) == len(keys) and np.all(np.abs(table[:, :4]) <= 1), "the boxes do not fit the gates")
+        _demand(len(rows) == len(gates) and np.all(np.abs(table[:, :4]) <= 1), "the boxes do not fit the gates")
         boxes = boxes_on(gates[gate], table, self._margin)
         closed = np.isnan(boxes[:, 8])
         room = self._room(boxes[closed, :2]) + boxes[closed, 4]
         _demand_each(self._world, room < self._inner, boxes[closed], "a box that may be free has no potential")
-        found: dict[Portal, list[np.ndarray]] = {key: [] for key in used_portals(set(keys), start, goals)}
-        for number, key in enumerate(keys):
-            if key in found:
-                mine = np.flatnonzero(gate == number)
-                _demand(_covers(table[mine]), f"boxes do not cover a level at {_place(self._world, gates[number])}")
-                found[key].append(boxes[mine[~closed[mine]]])
-        return {key: np.concatenate(some) for key, some in found.items()}
+        steps = ways(crossings, start, goals)
+        for number in np.flatnonzero(steps.any(axis=0)[portal]):
+            _demand(_covers(table[gate == number]), f"boxes do not cover a level at {_place(self._world, gates[number])}")
+        on_portals = [boxes[~closed & (portal[gate] == number)] for number in range(len(crossings))]
+        self._check_steps(steps, [*on_portals, self._start_box, *[self._goal_boxes] * len(goals)], enough)
 
-    def _check_edges(self, portals: dict[Portal, np.ndarray], start: int, goals: set[int], enough: float) -> None:
+    def _check_steps(self, steps: np.ndarray, boxes: list[np.ndarray], enough: float) -> None:
         """Show that no potential is higher than the curves from the start allow, or those before it and the curves from there."""
         # After the others what is left of the way to the goal is too long by itself.
-        opened = {key: boxes[boxes[:, 8] + boxes[:, 10] < enough] for key, boxes in portals.items()}
-        steps = [(boxes, before == start, [opened[key] for key in opened if key[1] == before and key[0] != after])
-                 for (before, after), boxes in portals.items()]
-        steps += [(self._goal_boxes, start in goals, [opened[key] for key in opened if key[1] in goals])]
-        for boxes, is_first, ahead in steps:
-            excess = too_high(self._start_box, boxes, self._radius, self._margin)
-            if not is_first:
-                boxes = boxes[excess > 0]
-                excess = np.max([too_high(some, boxes, self._radius, self._margin) for some in ahead], axis=0, initial=0)
-            if excess.max(initial=0):
+        ahead = [some[some[:, 8] + some[:, 10] < enough] for some in boxes]
+        for number in np.flatnonzero(steps.any(axis=0)):
+            higher = boxes[number][too_high(self._start_box, boxes[number], self._radius, self._margin) > 0]
+            before = np.flatnonzero(steps[:, number])
+            excess = np.max([too_high(ahead[i], higher, self._radius, self._margin) for i in before], axis=0, initial=0)
+            if excess.any():
                 worst = np.argmax(excess)
-                raise Refused(f"the potential at {_place(self._world, boxes[worst])} is {boxes[worst, 8]:.6g} m, "
+                raise Refused(f"the potential at {_place(self._world, higher[worst])} is {higher[worst, 8]:.6g} m, "
                               f"{excess[worst]:.3g} m higher than those before it allow")
 
 
@@ -289,22 +266,21 @@ def inner_radius(request: dict[str, Any]) -> float:
     return float(outline.exterior.distance(shapely.Point(0, 0))) if outline.contains(shapely.Point(0, 0)) else 0.0
 
 
-def used_portals(portals: set[Portal], start: int, goals: set[int]) -> set[Portal]:
-    """Return the portals on ways from the start to the goal that never go straight back, nor into the start's cell."""
-    last = next(iter(goals)) if len(goals) == 1 else None  # a path ends with its last visit there
-    portals = {(before, after) for before, after in portals if before != after and after != start and before != last}
-    backwards = _reached({(after, before) for before, after in portals}, goals)
-    return _reached(portals, {start}) & {(before, after) for after, before in backwards}
+def ways(crossings: np.ndarray, start: int, goals: set[int]) -> np.ndarray:
+    """Return the steps of all ways through the cells from the start to the goal, as a mask over pairs of portals.
 
-
-def _reached(portals: set[Portal], cells: set[int]) -> set[Portal]:
-    """Return the portals on ways from some cells on that never go straight back."""
-    found: set[Portal] = set()
-    due = {portal for portal in portals if portal[0] in cells}
-    while due:
-        found |= due
-        due = {(cell, after) for cell, after in portals - found if any(cell == to and after != of for of, to in due)}
-    return found
+    Portals are the (n, 2) cells before and after a crossing, then the start, then the goal's cells. A way never goes straight
+    back, nor into the cell of the start, nor on from that of the goal if there is but one: it ends with its last visit there.
+    """
+    before, after = np.array([*crossings.tolist(), (BEFORE, start), *((cell, AFTER) for cell in goals)]).T
+    is_start, is_goal = before == BEFORE, after == AFTER
+    is_last = ~is_goal & (len(goals) == 1) & np.isin(before, list(goals))
+    on = is_start | (before != after) & (after != start) & ~is_last
+    steps = (after[:, None] == before) & (before[:, None] != after) & on[:, None] & on
+    reached, leads = is_start, is_goal
+    for _ in before:
+        reached, leads = reached | steps[reached].any(axis=0), leads | steps[:, leads].any(axis=1)
+    return np.asarray(steps & (reached & leads)[:, None] & reached & leads)
 
 
 def _covers(rectangles: np.ndarray) -> bool:

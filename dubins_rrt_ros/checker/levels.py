@@ -70,22 +70,19 @@ class Squares:
             (n, 11) boxes, as `bounds.py` has them, of all poses in which a gate is crossed; and (n, 3) slab, row and column of
             the parts before and after it.
         """
-        place, boxes, parts = np.argwhere(self.corridor), [], []
-        triangles = self.triangles(FROM_START, *place.T)
-        for level, cost in enumerate(self.levels):
-            is_below = triangles[..., 2] < cost
-            square, half = np.nonzero(is_below.any(axis=2) & ~is_below.all(axis=2))
-            corners, is_below, each = triangles[square, half], is_below[square, half], np.arange(len(square))
-            lone = (is_below == (is_below.sum(axis=1, keepdims=True) == 1)).argmax(axis=1)  # the corner on a side of its own
-            first, others = corners[each, lone, None], np.stack([corners[each, (lone + i) % 3] for i in (1, 2)], axis=1)
-            ends = (first + (cost - first[..., 2:]) / (others - first)[..., 2:] * (others - first))[..., :2]
-            middle, along = self.corner + self.side * ends.mean(axis=1), self.side * (ends[:, 1] - ends[:, 0])
-            rising = np.arctan2(*gradients(corners).T[::-1])
-            half, left = np.hypot(*along.T) / 2, self._left[*place[square].T]
-            boxes.append(np.column_stack(np.broadcast_arrays(
-                *middle.T, -np.sin(rising), np.cos(rising), half, 0, rising, HALF_CIRCLE, 0, cost, left)))
-            parts.append(np.column_stack([np.full(len(square), level), place[square]]))
-        up, below = np.concatenate(boxes), np.concatenate(parts)
+        triangles = self.triangles(FROM_START, *np.nonzero(self.corridor))
+        is_below = triangles[..., 2] < self.levels[:, None, None, None]
+        level, square, half = np.nonzero(is_below.any(axis=3) & ~is_below.all(axis=3))
+        corners, is_below, cost = triangles[square, half], is_below[level, square, half], self.levels[level]
+        lone = (is_below == (is_below.sum(axis=1, keepdims=True) == 1)).argmax(axis=1)  # the corner on a side of its own
+        first, *others = (corners[np.arange(len(corners)), (lone + i) % 3] for i in (0, 1, 2))
+        ends = [first + ((cost - first[:, 2]) / (other - first)[:, 2])[:, None] * (other - first) for other in others]
+        one, other = (self.corner + self.side * end[:, :2] for end in ends)
+        rising, place = np.arctan2(*gradients(corners).T[::-1]), np.argwhere(self.corridor)[square]
+        up = np.column_stack(np.broadcast_arrays(
+            *((one + other) / 2).T, -np.sin(rising), np.cos(rising), np.hypot(*(other - one).T) / 2, 0, rising, HALF_CIRCLE, 0,
+            cost, self._left[*place.T]))
+        below = np.column_stack([level, place])
         down, above = up.copy(), below.copy()
         down[:, 6] += np.pi
         above[:, 0] += 1

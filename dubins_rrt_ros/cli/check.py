@@ -8,7 +8,7 @@ from dubins_rrt_ros.checker.check import Refused, check
 from dubins_rrt_ros.checker.maps import UnreadableMap
 from dubins_rrt_ros.planning.text import quoted_name
 
-from .common.certificates import proved
+from .common.certificates import proved, read_certificate
 from .common.example import ENDS, MAP
 from .common.parser import Parser, UsageError, describe
 from .common.request import find_map_or_suggest
@@ -30,7 +30,7 @@ def add_arguments(parser: Parser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Check, report, and return the exit status."""
     try:
-        claim = check(arguments.certificate, find_map_or_suggest(arguments.map))
+        claim = check(read_certificate(arguments.certificate), find_map_or_suggest(arguments.map))
     except Refused as refusal:
         print(f"{arguments.certificate} does not hold: {refusal}", file=sys.stderr)
         return 1

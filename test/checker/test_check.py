@@ -14,6 +14,7 @@ from support.spoils import SPOILS, Drive
 from dubins_rrt_ros.checker.check import Refused, boxes_on, check, goal_boxes
 from dubins_rrt_ros.checker.levels import FROM_START, Squares
 from dubins_rrt_ros.checker.maps import UnreadableMap
+from dubins_rrt_ros.cli.common.certificates import read_certificate
 from dubins_rrt_ros.planning import Problem, Vehicle, load_map
 from dubins_rrt_ros.planning.certificate.certificate import CertificateError, write_certificate
 
@@ -42,7 +43,7 @@ def spoilt(kind, folder):
 def test_a_certificate_is_accepted_and_its_claim_is_told(tmp_path):
     made = in_hall(tmp_path, 0.04)
     write_certificate(tmp_path / "path.cert", made.document)
-    claim = check(tmp_path / "path.cert", made.file)
+    claim = check(read_certificate(tmp_path / "path.cert"), made.file)
     assert claim == {name: made.document[name] for name in ("request", "length", "bound")}
     assert claim["bound"] <= claim["length"] <= 1.05 * claim["bound"]
     assert len(made.document["levels"]) >= 1 and sum(map(len, made.document["boxes"])) > 10
@@ -50,7 +51,7 @@ def test_a_certificate_is_accepted_and_its_claim_is_told(tmp_path):
 
 def test_plain_json_will_do(tmp_path):
     (tmp_path / "path.cert").write_text(json.dumps(TURNED.document))
-    assert check(tmp_path / "path.cert", TURNED.file)["bound"] == TURNED.document["bound"]
+    assert check(read_certificate(tmp_path / "path.cert"), TURNED.file)["bound"] == TURNED.document["bound"]
 
 
 @pytest.mark.parametrize(("kind", "said"), [
@@ -122,11 +123,11 @@ def test_the_request_is_of_numbers_and_an_outline_that_does_not_cross_itself(tmp
 def test_a_pipe_without_a_writer_is_not_waited_for_and_what_expands_without_an_end_is_refused(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "long.cert").write_bytes(gzip.compress(b" " * 10_000))
-    monkeypatch.setattr("dubins_rrt_ros.checker.check.MOST_BYTES", 1000)
+    monkeypatch.setattr("dubins_rrt_ros.cli.common.certificates.MOST_BYTES", 1000)
     for file, said in ((tmp_path / "pipe", "as certificates are"), ("/dev/zero", "1000 bytes or more"),
                        (tmp_path / "long.cert", "1000 bytes or more")):
         with pytest.raises(Refused, match=said):
-            check(file, TURNED.file)
+            check(read_certificate(file), TURNED.file)
 
 
 def test_squares_and_a_vehicle_without_a_size_are_refused(tmp_path):
@@ -189,7 +190,7 @@ def test_boxes_that_reach_beyond_their_gates_are_refused(tmp_path):
 def test_what_is_no_number_is_refused(number, tmp_path):
     (tmp_path / "path.cert").write_text(json.dumps(TURNED.document | {"limit": 777.25}).replace("777.25", number))
     with pytest.raises(Refused, match="is no number"):
-        check(tmp_path / "path.cert", TURNED.file)
+        check(read_certificate(tmp_path / "path.cert"), TURNED.file)
 
 
 @pytest.mark.parametrize("cells", [[], [0], None])
@@ -214,14 +215,14 @@ def test_cells_have_to_fit(cells, tmp_path):
 def test_what_is_no_certificate_is_refused(content, tmp_path):
     (tmp_path / "path.cert").write_bytes(content)
     with pytest.raises(Refused, match=re.escape("the file is not as certificates are")):
-        check(tmp_path / "path.cert", TURNED.file)
+        check(read_certificate(tmp_path / "path.cert"), TURNED.file)
 
 
 def test_a_map_that_cannot_be_read_is_no_verdict(tmp_path):
     write_certificate(tmp_path / "path.cert", TURNED.document)
     (tmp_path / "map.yaml").write_text("image: none.pgm")
     with pytest.raises(UnreadableMap, match="KeyError"):
-        check(tmp_path / "path.cert", tmp_path / "map.yaml")
+        check(read_certificate(tmp_path / "path.cert"), tmp_path / "map.yaml")
 
 
 @needs_compiled

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dubins_rrt_ros.checker.check import Refused, check
+from dubins_rrt_ros.cli.common.certificates import read_certificate
 from dubins_rrt_ros.planning import GridMap, Problem, Settings, Vehicle, plan, save_map
 from dubins_rrt_ros.planning.certificate.certificate import certify, checked_map, write_certificate
 from support.cases import boxes_grid, maze_grid
@@ -60,7 +61,7 @@ def refusal(certified, folder):
     """The checker's sentence about a document, "" where it holds."""
     write_certificate(folder / "path.cert", certified.document)
     try:
-        check(folder / "path.cert", certified.file)
+        check(read_certificate(folder / "path.cert"), certified.file)
     except Refused as refused:
         return str(refused)
     return ""

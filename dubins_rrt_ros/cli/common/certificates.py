@@ -1,10 +1,17 @@
 """Certificates of paths, as commands write them."""
 
 import argparse
+import gzip
+import io
 import math
+import os
+import stat
 import sys
+import zlib
+from pathlib import Path
 from typing import Any
 
+from dubins_rrt_ros.checker.check import NO_CERTIFICATE, Refused
 from dubins_rrt_ros.checker.maps import World
 from dubins_rrt_ros.planning import Plan, Problem
 
@@ -15,6 +22,8 @@ from .request import find_map_or_suggest
 GAP, SECONDS = 0.005, 30.0
 #: Options of a request with which a path has no certificate.
 UNCERTIFIED = ("start_slack",)
+#: Size from which on a certificate is not read [bytes].
+MOST_BYTES = 2**28
 
 
 def add_certificate_flags(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +70,26 @@ def write_proof(file: str, answer: Plan, world: World, gap: float, seconds: floa
     document = certify(answer.problem, answer.path, world, gap, seconds)
     write_certificate(file, document)
     return f"{file}: a path of {document['length']:.4f} m, and {proved(document)}"
+
+
+def read_certificate(file: str | Path) -> bytes:
+    """Return the JSON of a certificate; the file may be a pipe or a device, and expand to more than there is memory for.
+
+    Raises:
+        Refused: it is too large, or damaged.
+        OSError: it cannot be read.
+    """
+    descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to is not waited for
+    os.set_blocking(descriptor, True)
+    with open(descriptor, "rb") as opened:
+        data = opened.read(-1 if stat.S_ISREG(os.fstat(descriptor).st_mode) else MOST_BYTES)
+    try:
+        text = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MOST_BYTES) if data[:2] == b"\x1f\x8b" else data
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise Refused(f"{NO_CERTIFICATE}: {error}") from None
+    if len(text) >= MOST_BYTES:
+        raise Refused(f"the file has {MOST_BYTES} bytes or more")
+    return text
 
 
 def proved(claim: dict[str, Any]) -> str:

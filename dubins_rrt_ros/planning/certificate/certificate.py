@@ -4,6 +4,7 @@ import gzip
 import json
 import time
 from collections.abc import Callable
+from itertools import compress
 from pathlib import Path as File
 from typing import Any
 
@@ -12,7 +13,7 @@ import shapely
 from scipy import ndimage
 
 from ...checker.bounds import too_high
-from ...checker.check import MARGIN, goal_boxes, inner_radius, used_portals
+from ...checker.check import MARGIN, goal_boxes, inner_radius, ways
 from ...checker.levels import FROM_START, TO_GOAL, Squares
 from ...checker.maps import UnreadableMap, digest_of_cells, read_map
 from ...checker.maps import World as CheckedMap
@@ -164,7 +165,9 @@ class _Draft:
     def _cover(self) -> Cover:
         (gates, *parts), ends = self._squares.gates(), self._ends()
         keys = list(zip(*(self._cells[*some.T].tolist() for some in parts), strict=True))
-        return Cover(gates, keys, used_portals(set(keys), ends.start_cell, ends.goal_cells), ends, self._is_blocked, self._margin)
+        portals = sorted(set(keys))
+        used = compress(portals, ways(np.array(portals), ends.start_cell, ends.goal_cells).any(axis=0))
+        return Cover(gates, keys, list(used), ends, self._is_blocked, self._margin)
 
     def _ends(self) -> Ends:
         start, goal = (self._world.own(self._request[name]) for name in ("start", "goal"))

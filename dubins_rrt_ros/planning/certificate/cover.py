@@ -39,24 +39,24 @@ class Cover:
         margin: length that boxes are larger than they need be [m].
     """
 
-    def __init__(self, gates: np.ndarray, keys: list[Key], used: set[Key], ends: Ends,
+    def __init__(self, gates: np.ndarray, keys: list[Key], used: list[Key], ends: Ends,
                  is_blocked: Callable[[np.ndarray], np.ndarray], margin: float):
         """Cover each gate with one box.
 
         Args:
             gates: (n, 11) boxes of all poses in which they are crossed.
             keys: the cells before and after each gate.
-            used: the pairs of cells between which paths cross levels.
+            used: the pairs of cells between which paths cross levels, in ascending order.
             is_blocked: says of (n, 11) boxes which hold no free place.
             margin: see above.
         """
         self.gates, self.ends, self.margin, self._is_blocked = gates, ends, margin, is_blocked
-        self._used = sorted(used)
+        self._used = used
         self.before = [[j for j, (before, after) in enumerate(self._used) if after == key[0] and before != key[1]]
                        for key in self._used]
         self.after = [[j for j, before in enumerate(self.before) if i in before] for i in range(len(self._used))]
         number = {key: i for i, key in enumerate(self._used)}
-        self.index = np.array([gate for gate, key in enumerate(keys) if key in used], int)
+        self.index = np.array([gate for gate, key in enumerate(keys) if key in number], int)
         self._portal = np.array([number[keys[gate]] for gate in self.index], int)
         self.shares = np.tile((-1.0, 1.0, -1.0, 1.0), (len(self.index), 1))
         self.potentials = np.zeros(len(self.index))
