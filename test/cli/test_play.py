@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dubins_rrt_ros.cli.main import main
+from dubins_rrt_ros.cli.play.workbench import Workbench
 from dubins_rrt_ros.planning import GridMap, MapError, PolygonMap, load_map, save_map
 
 aiohttp = pytest.importorskip("aiohttp", reason="aiohttp comes with the extra play")
@@ -285,6 +286,32 @@ def test_what_is_copied_plans_the_same(server, via, capsys, monkeypatch, tmp_pat
     names = {}
     exec(texts["Python"], names)
     assert names["result"].length == answer["length"]
+
+
+@pytest.mark.parametrize("loads", [False, True], ids=["begun with", "loaded on the page"])
+def test_what_is_copied_says_how_a_picture_was_read(loads, tmp_path, capsys, monkeypatch):
+    from PIL import Image
+    Image.new("L", (40, 30), 255).save(tmp_path / "room.png")
+    bench = workbench(tmp_path)
+    if not loads:
+        bench = Workbench(load_map(tmp_path / "room.png", resolution=0.5), "room.png", str(tmp_path), {"resolution": 0.5})
+
+    async def copied(page):
+        if loads:
+            await page.send(type="load", name="room.png", resolution=0.5)
+        await page.plan(1, start=[3, 10, 0], goal=[17, 10, 0], settings={"samples": 10, "planning_time": 30.0})
+        await page.final(1)
+        texts = []
+        for kind in ("command", "Python"):
+            await page.send(type="copy", **{"as": kind})
+            texts.append((await page.receive("copy"))["text"])
+        return texts
+    with serving(bench) as server:
+        command, program = talk(server, copied)
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command)[1:]) == 0
+    exec(program, names := {})
+    assert names["result"].solved
 
 
 def test_a_large_grid_is_shown_smaller_and_no_wall_vanishes():

@@ -21,8 +21,8 @@ from dubins_rrt_ros.planning.text import one_line
 from .documents import read_json
 from .parser import near_miss
 
-#: The arguments of load_map that have flags.
-MAP_FLAGS = ("max_map_cells", "resolution", "unknown_grey")
+#: The arguments of load_map that have flags, with their defaults.
+MAP_FLAGS: dict[str, Any] = {"max_map_cells": MAX_CELLS.default, "resolution": None, "unknown_grey": UNKNOWN_GREY.default}
 
 
 class LoadedRequest(NamedTuple):
@@ -66,6 +66,11 @@ def add_map_arguments(parser: argparse.ArgumentParser, pictures: bool = True) ->
 def map_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return the keyword arguments of load_map that the flags of `add_map_arguments` give."""
     return {name: getattr(arguments, name) for name in MAP_FLAGS if name in arguments}
+
+
+def given_map_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return those of `map_options` that are not the defaults."""
+    return {name: value for name, value in map_options(arguments).items() if value != MAP_FLAGS[name]}
 
 
 def find_map_or_suggest(name: str) -> Path:

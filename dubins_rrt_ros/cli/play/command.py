@@ -12,7 +12,7 @@ from dubins_rrt_ros.planning.text import install_command
 
 from ..common.example import MAP
 from ..common.parser import Parser, UsageError, describe
-from ..common.request import add_map_arguments, map_options, read_map
+from ..common.request import add_map_arguments, given_map_options, map_options, read_map
 from .workbench import Workbench
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(f"there is no folder {arguments.folder}; make it first")
     from .session import Session
     world_map, _ = read_map(arguments.map, **map_options(arguments))
-    workbench = Workbench(world_map, arguments.map, arguments.folder)
+    workbench = Workbench(world_map, arguments.map, arguments.folder, given_map_options(arguments))
     return serve(lambda send: Session(workbench, send), f"Playing on {workbench.name}", arguments)
 
 

@@ -167,24 +167,25 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def as_command(request: PlanRequest, map_name: str) -> str:
-    """Return the command line that plans a request."""
+def as_command(request: PlanRequest, map_name: str, map_options: Mapping[str, Any]) -> str:
+    """Return the command line that plans a request, on a map that was loaded with options of `load_map`."""
     words = ["dubins_rrt", "plan", map_name, "--start", *map(repr, request.start), "--goal", *map(repr, request.goal)]
     for waypoint in request.via:
         words += ["--via", *(repr(number) for number in waypoint if number is not None)]
-    for name, value in _given(request).items():
+    for name, value in {**map_options, **_given(request)}.items():
         words += [flag(name if value is not False else f"no_{name}"), *([] if isinstance(value, bool) else [str(value)])]
     return shlex.join(words)
 
 
-def as_python(request: PlanRequest, map_name: str) -> str:
-    """Return the program that plans a request."""
+def as_python(request: PlanRequest, map_name: str, map_options: Mapping[str, Any]) -> str:
+    """Return the program that plans a request, on a map that was loaded with options of `load_map`."""
     parts = {"Vehicle": _differing(request.vehicle), "Problem": request.problem, "Settings": _differing(request.settings)}
     keywords = {name: ", ".join(f"{key}={value!r}" for key, value in given.items()) for name, given in parts.items()}
     more = f", {keywords['Problem']}" if keywords["Problem"] else ""
+    of_map = "".join(f", {key}={value!r}" for key, value in map_options.items())
     verb, waypoints = ("plan_through", f"{list(request.via)!r}, ") if request.via else ("plan", "")
     return (f"from dubins_rrt_ros.planning import Problem, Settings, Vehicle, load_map, {verb}\n\n"
-            f"problem = Problem(load_map({map_name!r}), Vehicle({keywords['Vehicle']}),\n"
+            f"problem = Problem(load_map({map_name!r}{of_map}), Vehicle({keywords['Vehicle']}),\n"
             f"                  start={request.start!r}, goal={request.goal!r}{more})\n"
             f"result = {verb}(problem, {waypoints}Settings({keywords['Settings']}))\n"
             "print(result.message)\n")

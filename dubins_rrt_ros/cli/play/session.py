@@ -135,12 +135,12 @@ class Session:
     def _copy(self, document: Mapping[str, Any]) -> None:
         if self._last is None:
             raise ValueError("there is no answer to copy yet")
-        (request, answer), name, kind = self._last, self._workbench.name, document.get("as")
+        (request, answer), bench, kind = self._last, self._workbench, document.get("as")
         if kind == "JSON":
-            text = json.dumps(finite(to_document(answer, name)), allow_nan=False)
+            text = json.dumps(finite(to_document(answer, bench.name)), allow_nan=False)
         else:
-            text = (messages.as_python if kind == "Python" else messages.as_command)(request, name)
-        note = "The map was drawn on: save it first, so that this finds it." if self._workbench.changed else ""
+            text = (messages.as_python if kind == "Python" else messages.as_command)(request, bench.name, bench.options)
+        note = "The map was drawn on: save it first, so that this finds it." if bench.changed else ""
         self._send_document({"type": "copy", "as": kind, "text": text, "note": note})
 
     def _plan(self, request: PlanRequest) -> None:

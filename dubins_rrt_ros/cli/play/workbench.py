@@ -3,8 +3,11 @@
 import json
 import os
 import threading
+from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import shapely
@@ -30,14 +33,14 @@ class Workbench:
     Attributes:
         folder: maps are loaded and saved in there and below alone; the package's own maps may be loaded too.
         map: the map as it is now.
-        name: the map as it was loaded or saved, for commands.
+        name, options: the map as it was loaded or saved, and what `load_map` took beside its name, for commands.
         changed: True if it was drawn on since.
         lock: held by a page that reads or changes it.
     """
 
-    def __init__(self, world_map: Map, name: str, folder: str):
+    def __init__(self, world_map: Map, name: str, folder: str, options: Mapping[str, Any] = MappingProxyType({})):
         self.folder = os.path.realpath(folder)
-        self.map, self.name, self.changed = world_map, name, False
+        self.map, self.name, self.options, self.changed = world_map, name, dict(options), False
         self.lock = threading.Lock()
         self._world: World | None = None
         self._erasable = shapely.envelope(world_map.free) if isinstance(world_map, PolygonMap) else None
@@ -70,6 +73,7 @@ class Workbench:
             name = str(file)
         self._replace(loaded)
         self.name, self.changed = name, False
+        self.options = {} if resolution is None else {"resolution": resolution}
         self._erasable = shapely.envelope(loaded.free) if isinstance(loaded, PolygonMap) else None
 
     def save(self, name: str) -> None:
@@ -88,7 +92,7 @@ class Workbench:
             save_map(self.map, file)
         else:
             self._save_polygons(file, ending)
-        self.name, self.changed = str(file), False
+        self.name, self.options, self.changed = str(file), {}, False
 
     def _save_polygons(self, file: Path, ending: str) -> None:
         free = self.map.free if isinstance(self.map, PolygonMap) else None
