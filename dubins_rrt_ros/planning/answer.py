@@ -8,7 +8,7 @@ from .curves.angles import heading_error, position_error
 from .curves.path import Path
 from .diagnosis import explain
 from .problem import Problem
-from .result import gap_above
+from .result import Status, gap_above
 from .search.cost import minimises_length
 from .search.tree import Tree
 from .settings import Settings
@@ -71,7 +71,7 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     so_far = " so far" if running else ""
     above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved and not problem.is_free else "")
     found = f", found by {ALGORITHMS[answer.found_by]}" if answer.found_by else ""
-    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {'cancelled ' if cancelled else ''}{effort(samples, elapsed)}"
+    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {effort(samples, elapsed, cancelled)}"
     if problem.vehicle.required_clearance < 0:
         message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
     if problem.is_free:
@@ -79,10 +79,10 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     return f"{message}{end_clause(problem, path)}."
 
 
-def effort(samples: int, elapsed: float) -> str:
-    """Return after how many samples and in what time [s] a path was found, as a clause."""
+def effort(samples: int, elapsed: float, cancelled: bool) -> str:
+    """Return after how many samples and in what time [s] a path was found, and whether that was the end, as a clause."""
     drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample,"
-    return f"{drawn} in {elapsed:.3g} s"
+    return f"{'cancelled ' if cancelled else ''}{drawn} in {elapsed:.3g} s"
 
 
 def end_clause(problem: Problem, path: Path) -> str:
@@ -95,9 +95,11 @@ def end_clause(problem: Problem, path: Path) -> str:
     return f"; it ends {off:.3f} m and {turned:.3f} rad from the goal"
 
 
-def not_audited_message(path: Path) -> str:
-    """Return what is said of a path that was found too late for its audit, in a sentence."""
-    return f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
+def not_audited(path: Path, cancelled: bool) -> tuple[Status, str]:
+    """Return the status of a request that ended before a path that was found was audited, and the sentence on it."""
+    if cancelled:
+        return Status.CANCELLED, f"Cancelled before a first path: one of {path.length:.2f} m was found, but not audited yet."
+    return Status.TIMEOUT, f"A path of {path.length:.2f} m was found, but there was no time left to audit it; allow more time."
 
 
 def defect_message(audit: Audit) -> str:

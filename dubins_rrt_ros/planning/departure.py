@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from ._kernels.collision import CollisionChecker
-from .answer import defect_message, not_audited_message
+from .answer import defect_message, not_audited
 from .audit.departure import judge_clearance
 from .audit.sweep import CONTACT
 from .audit.verdict import Audit, audit_path, driven_arcs, in_order
@@ -109,8 +109,7 @@ class WholePlans:
             audit = self._audit(path)
         except OutOfTime:
             cancelled = self._deadline.cancelled
-            status = Status.CANCELLED if cancelled else Status.TIMEOUT
-            return self._without_path(answer, status, not_audited_message(path), time_to_first=None, cancelled=cancelled)
+            return self._without_path(answer, *not_audited(path, cancelled), time_to_first=None, cancelled=cancelled)
         if not audit.ok:
             return self._without_path(answer, Status.UNKNOWN, defect_message(audit), audit=audit)
         node = np.flatnonzero((plan.tree.poses == plan.path.end).all(axis=1) & (plan.tree.costs == plan.cost))[0]

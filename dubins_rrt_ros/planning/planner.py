@@ -6,7 +6,7 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from .answer import LEAST_IMPROVEMENT, AuditedPath, defect_message, not_audited_message, success_message
+from .answer import LEAST_IMPROVEMENT, AuditedPath, defect_message, not_audited, success_message
 from .arguments import check_call
 from .audit.obstacles import Obstacles
 from .audit.verdict import Audit, audit_path
@@ -323,8 +323,7 @@ class _Call:
             cancelled = cancelled or self._deadline.cancelled
             if self._best:
                 return self._with_path(self._best, cancelled)
-            status = Status.CANCELLED if cancelled else Status.TIMEOUT
-            return self._plan(status, not_audited_message(path), tree, samples=samples, cancelled=cancelled)
+            return self._plan(*not_audited(path, cancelled), tree, samples=samples, cancelled=cancelled)
         if not audited.audit.ok:
             return self._plan(Status.UNKNOWN, defect_message(audited.audit), tree, samples=samples, audit=audited.audit)
         if not (self._best and self._best.outlasts(audited, price_of_curve(self._problem.vehicle))):

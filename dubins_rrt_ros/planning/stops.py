@@ -1,8 +1,8 @@
 """The places that a path over waypoints passes, and the legs between them of a path that is known."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -38,19 +38,20 @@ class Stop(NamedTuple):
         return self if len(self.poses) == 1 or pose in self.poses else self._replace(poses=[*self.poses, pose])
 
 
-def stops_of(problem: Problem, waypoints: Sequence[Waypoint]) -> Iterator[Stop]:
+def stops_of(problem: Problem, waypoints: Iterable[Waypoint]) -> Iterator[Stop]:
     """Yield start, waypoints and goal; those at one place are one stop if one heading fits all."""
     here: Waypoint = problem.start
-    indices: tuple[int, ...] = ()
+    indices: list[int] = []
     goal = (*problem.goal[:2], None if problem.any_goal_heading else problem.goal[2])
-    for index, there in enumerate((*waypoints, goal)):
+    for index, there in chain(enumerate(waypoints), [(None, goal)]):
         both = _common(here, there)
         if both is None:
-            yield Stop(_poses(here), indices)
-            indices = ()
+            yield Stop(_poses(here), tuple(indices))
+            indices = []
         here = both or there
-        indices = (*indices, index) if index < len(waypoints) else indices
-    yield Stop(_poses(here), indices)
+        if index is not None:
+            indices.append(index)
+    yield Stop(_poses(here), tuple(indices))
 
 
 def _common(here: Waypoint, there: Waypoint) -> Waypoint | None:

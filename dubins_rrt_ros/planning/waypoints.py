@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .answer import defect_message, effort, end_clause, not_audited_message
+from .answer import defect_message, effort, end_clause, not_audited
 from .arguments import check_call
 from .audit.verdict import Audit, audit_path, passing_findings
 from .curves import dubins
@@ -106,7 +106,8 @@ class _Call:
     def answer(self) -> Plan:
         """Choose the headings, plan the legs, and join them."""
         try:
-            stops = [stop for stop in stops_of(replace(self._problem, goal=self._aim), self._waypoints) if self._in_time()]
+            waypoints = (waypoint for waypoint in self._waypoints if self._in_time())
+            stops = list(stops_of(replace(self._problem, goal=self._aim), waypoints))
             return self._answer_over(stops)
         except OutOfTime:
             return self._out_of_time()
@@ -132,7 +133,7 @@ class _Call:
             self._on_progress(Progress(first.samples, first.planning_time, first.length, True, lambda: first, lambda: first.tree,
                                        first.cost))
         if self._settings.planner == "rrt" or self._clock.is_over:
-            return first
+            return self._ended(first)
         if choice.try_others(self._clock.elapsed + self._time(OTHERS_SHARE)):
             paths = min(paths, self._turned(stops, choice.paths()), key=self._cost)
         return self._joined(stops, self._turned(stops, self._planned(paths)), choice.found_by, first)
@@ -261,24 +262,33 @@ class _Call:
         try:
             audit = self._audit(path)
         except OutOfTime:
-            cancelled = self._clock.cancelled
             if before and before.path:
-                return replace(before, cancelled=cancelled, planning_time=self._clock.elapsed)
-            return self._plan(Status.CANCELLED if cancelled else Status.TIMEOUT, not_audited_message(path), tree,
-                              samples=self._samples, cancelled=cancelled)
+                return self._ended(before)
+            cancelled = self._clock.cancelled
+            return self._plan(*not_audited(path, cancelled), tree, samples=self._samples, cancelled=cancelled)
         if not audit.ok:
             return self._plan(Status.UNKNOWN, defect_message(audit), tree, audit=audit)
         if self._time_to_first is None:
             self._time_to_first = self._clock.elapsed
-        count = len(self._waypoints)
-        message = (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, "
-                   f"{effort(self._samples, self._clock.elapsed)}{end_clause(self._problem, path)}.")
         bound = min(least_length(self._problem, self._waypoints, self._proved), path.length)
-        answer = self._plan(Status.NONE, message, tree, path=path, audit=audit, samples=self._samples, lower_bound=bound,
-                            cost=float(tree.costs[-1]), cost_lower_bound=bound,
+        answer = self._plan(Status.NONE, self._success(path, self._samples), tree, path=path, audit=audit,
+                            samples=self._samples, lower_bound=bound, cost=float(tree.costs[-1]), cost_lower_bound=bound,
                             roomy_share=self._objective.roomy_share(path), found_by=found_by,
                             cancelled=self._clock.cancelled)
         return replace(answer, waypoint_indices=tuple(passing_indices(stops, paths, answer.poses())))
+
+    def _success(self, path: Path, samples: int) -> str:
+        """Return what was found, in a sentence."""
+        count = len(self._waypoints)
+        return (f"Path of {path.length:.2f} m over {count} waypoint{'' if count == 1 else 's'}, "
+                f"{effort(samples, self._clock.elapsed, self._clock.cancelled)}{end_clause(self._problem, path)}.")
+
+    def _ended(self, answer: Plan) -> Plan:
+        """Return an earlier plan as the answer of a request that ends now."""
+        if answer.path is None:
+            return answer
+        return replace(answer, message=self._success(answer.path, answer.samples), cancelled=self._clock.cancelled,
+                       planning_time=self._clock.elapsed)
 
     def _audit(self, path: Path) -> Audit:
         """Audit the path of all legs, and keep as much time for the next audit."""

@@ -284,6 +284,24 @@ def test_more_waypoints_than_there_is_time_for_keep_the_deadline(plane, cancel, 
     assert answer.status == status and answer.message.startswith(said)
 
 
+@needs_compiled
+@pytest.mark.parametrize("place", [BELOW, (*BELOW, 0.5), GOAL, START])
+def test_of_many_waypoints_at_one_place_each_is_followed_by_a_look_at_the_time(world, place):
+    looks = []
+    answer = plan_through(Problem(world, start=START, goal=GOAL), [place] * 2000, FIRST, cancel=lambda: looks.append(place))
+    assert answer.path and len(set(answer.waypoint_indices)) == 1
+    assert len(looks) > 2000
+
+
+@needs_compiled
+def test_a_request_that_is_cancelled_after_its_first_path_says_so(world):
+    cancelled = Event()
+    answer = plan_through(Problem(world, start=START, goal=GOAL), WITH_HEADINGS, SETTINGS, cancel=cancelled.is_set,
+                          on_progress=lambda progress: cancelled.set())
+    answer.check()
+    assert answer.cancelled and "over 2 waypoints, cancelled " in answer.message
+
+
 def test_a_cancelled_request_has_no_path(world):
     answer = plan_through(Problem(world, start=START, goal=GOAL), [BELOW, ABOVE], SETTINGS, cancel=lambda: True)
     answer.check()
@@ -325,6 +343,7 @@ def test_a_request_that_is_cancelled_during_its_first_audit_is_cancelled(world, 
     answer = plan_through(Problem(world, start=START, goal=GOAL), WITH_HEADINGS, SETTINGS, cancel=cancelled.is_set)
     answer.check()
     assert answer.status == Status.CANCELLED and answer.path is None
+    assert re.match(r"Cancelled before a first path: one of \d+\.\d\d m was found, but not audited yet\.", answer.message)
 
 
 @needs_compiled
