@@ -141,20 +141,23 @@ def path_message(poses: np.ndarray, frame: str, stamp: Time) -> PathMessage:
 
 
 def path_poses(message: PathMessage) -> np.ndarray:
-    """Return the (n, 3) poses of a path message, as x [m], y [m] and yaw [rad]; of poses that lean, as `pose_from` takes them.
+    """Return the (n, 3) poses of a path message, as x [m], y [m] and yaw [rad]; each as `pose_from` takes it.
 
     Raises:
-        InvalidPose: one is not finite, or no rotation.
+        InvalidPose: as `pose_from` does; the pose's index is in the message.
     """
-    stated = [(p.position.x, p.position.y, p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w)
+    stated = [(p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w)
               for p in map(bare_pose, message.poses)]
-    px, py, x, y, z, w = np.array(stated, dtype=float).reshape(-1, 6).T
-    norm = np.sqrt(w * w + x * x + y * y + z * z)
-    usable = np.isfinite(px) & np.isfinite(py) & (norm >= LEAST_NORM) & (norm < math.inf)
-    if not usable.all():
-        number = int(np.argmin(usable))
-        pose_from(f"path's {number}.", message.poses[number])
-    return np.column_stack([px, py, np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)])
+    px, py, pz, x, y, z, w = np.array(stated, dtype=float).reshape(-1, 7).T
+    with np.errstate(over="ignore", invalid="ignore"):
+        square = w * w + x * x + y * y + z * z
+        along, across = w * w + x * x - y * y - z * z, 2 * (w * z + x * y)
+        level = np.hypot(along, across) >= 1.01 * math.sin(LEAST_ANGLE_TO_VERTICAL) * square
+        plain = np.isfinite(px + py + pz) & (square > 1.01 * LEAST_NORM**2) & (square < math.inf) & level
+        poses = np.column_stack([px, py, np.arctan2(across, along)])
+    for index in np.flatnonzero(~plain).tolist():
+        poses[index] = pose_from(f"path's index {index}", message.poses[index])
+    return poses
 
 
 def planar_rows(poses: np.ndarray) -> np.ndarray:
@@ -218,7 +221,7 @@ def _doubts_about_cells(data: np.ndarray) -> Iterator[str]:
 
 
 def updated_grid(grid: GridMap, message: Any, frame: str) -> GridMap:
-    """Return a map with the cells of a map_msgs/OccupancyGridUpdate in place of its own.
+    """Return a map with the cells of a map_msgs/OccupancyGridUpdate in place of its own; the map itself where these are the same.
 
     Args:
         grid: the map; it stays as it is.
@@ -237,10 +240,13 @@ def updated_grid(grid: GridMap, message: Any, frame: str) -> GridMap:
                        "times height values")
     if not (0 <= message.x <= width - message.width and 0 <= message.y <= height - message.height):
         raise MapError(f"the map update, {message.width} x {message.height} cells at ({message.x}, {message.y}), reaches beyond "
-                       f"the map of {width} x {height}; give a part of the map")
-    cells = grid.data.copy()
+                       f"the map of {width} x {height} cells; give a part of the map")
     window = np.frombuffer(message.data, dtype=np.int8).reshape(message.height, message.width)
-    cells[message.y:message.y + message.height, message.x:message.x + message.width] = window
+    place = np.s_[message.y:message.y + message.height, message.x:message.x + message.width]
+    if np.array_equal(grid.data[place], window):
+        return grid
+    cells = grid.data.copy()
+    cells[place] = window
     return GridMap(cells, grid.resolution, grid.origin, grid.name, percent=True, thresholds=grid.thresholds,
                    warnings=tuple(_doubts_about_cells(cells)))
 

@@ -213,10 +213,13 @@ class Maps:
         except MapError as error:
             self.refuse(error, log_again=False)
         else:
-            self.take(grid, grid, by_topic=True)
+            if grid is not self.grid:
+                self.take(grid, grid, by_topic=True)
+            else:
+                self._keep()
 
     def _keep(self) -> None:
-        """Stay with the map, which came again: a publisher may repeat it each second."""
+        """Stay with the map, which came again, or of which nothing changed: a publisher may repeat it each second."""
         if self.refusal:
             self.refusal = ""
             self._queue.post(self._on_news)

@@ -47,8 +47,9 @@ class PathValidity:
         self._readiness.require_map()
         if not path.poses:
             raise InvalidPose("The path is empty; give its poses.")
-        if path.header.frame_id not in ("", frame):
-            raise InvalidPose(f"The path is in frame {quoted_name(path.header.frame_id)}; give it in '{frame}'.")
+        for header in (path.header, *(pose.header for pose in path.poses)):  # where the path has no frame, its poses may
+            if header.frame_id not in ("", frame):
+                raise InvalidPose(f"The path is in frame {quoted_name(header.frame_id)}; give it in '{frame}'.")
 
     def _judged(self, path: Any) -> Future:
         """Return a future of the indices of poses that are not valid, or of what was raised."""

@@ -25,6 +25,7 @@ from dubins_rrt_ros.node.conversions import (
     grid_from,
     grid_message,
     path_message,
+    path_poses,
     pose_from,
     pose_message,
     rigid_from,
@@ -172,6 +173,9 @@ def test_a_pose_that_is_none_is_refused_with_its_name_and_the_reason(message, re
     with pytest.raises(InvalidPose, match=reason) as refusal:
         pose_from("goal", message)
     assert str(refusal.value).startswith("The goal pose ")
+    with pytest.raises(InvalidPose, match=reason) as refusal:
+        path_poses(PathMessage(poses=[stamped(), message]))
+    assert str(refusal.value).startswith("The path's index 1 pose ")
 
 
 def test_a_path_message_has_all_poses_in_the_frame(over_the_wire):
@@ -180,6 +184,16 @@ def test_a_path_message_has_all_poses_in_the_frame(over_the_wire):
     assert {(h.frame_id, h.stamp.sec, h.stamp.nanosec) for h in (message.header, *(p.header for p in message.poses))} \
         == {("map", 12, 34)}
     assert np.array([pose_from("any", pose) for pose in message.poses]) == pytest.approx(poses, abs=1e-15)
+
+
+@pytest.mark.parametrize("scale", [1.1e-3, 1.0, 50.0, 1e200])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_poses_of_a_path_are_taken_as_each_alone_is(seed, scale):
+    rng = np.random.default_rng(seed)
+    rotations = Rotation.random(100, random_state=rng).as_quat() * scale
+    poses = [stamped(*rng.uniform(-9, 9, 2).tolist(), q=q) for q in rotations.tolist()]
+    expected = np.array([pose_from("goal", pose) for pose in poses])
+    assert path_poses(PathMessage(poses=poses)) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("nothing", [(), np.empty((0, 3))])

@@ -43,6 +43,16 @@ def test_a_part_of_the_map_that_changed_is_taken_as_the_whole_map_with_it_would_
     assert "refused" not in process.output
 
 
+@pytest.mark.parametrize("window", [(slice(0, 50), slice(0, 50)), (slice(0, 0), slice(0, 50))], ids=["the same", "no cells"])
+def test_an_update_that_changes_nothing_is_no_other_map(updates, window):
+    process, client, topic = updates
+    publish(client, process, FREE)
+    topic.publish(update(FREE, *window))
+    topic.publish(update(DETOUR, slice(0, 100), slice(0, 100)))
+    client.wait_for(lambda: process.map_id == id_of(DETOUR), "the changed map")
+    assert process.output.count("Took a map") == 2
+
+
 @pytest.mark.parametrize(("changes", "words"), [
     ({"x": 60}, "reaches beyond the map of 100 x 100"), ({"y": -1}, "reaches beyond"), ({"width": 7}, "values for 7 x"),
     ({"frame": "odom"}, "in frame 'odom', not in 'map'")])

@@ -11,6 +11,7 @@ pytest.importorskip("nav2_msgs", reason="nav2_msgs is not here; .ci/messages bui
 from builtin_interfaces.msg import Time
 from nav2_msgs.srv import IsPathValid
 from nav2_msgs_shapes.srv import LaterIsPathValid
+from std_msgs.msg import Header
 from support.harness import Client
 from support.yard import ENDLESS, GOAL, ON_THE_WAY_OUT, QUICK, START
 
@@ -77,7 +78,7 @@ def test_the_footprint_is_judged(client):
 
 
 @pytest.mark.parametrize(("path", "reason"), [
-    (np.empty((0, 3)), "empty"), (np.array([[np.nan, 5.0, 0.0]]), "finite")])
+    (np.empty((0, 3)), "empty"), (np.array([[3.0, 3.0, 0.0], [np.nan, 5.0, 0.0]]), "path's index 1 pose is at x nan")])
 def test_a_path_that_cannot_be_judged_is_false_and_the_log_says_why(client, path, reason):
     assert ask(client, message(path)) == IsPathValid.Response(is_valid=False)
     client.wait_for_word(reason)
@@ -86,6 +87,14 @@ def test_a_path_that_cannot_be_judged_is_false_and_the_log_says_why(client, path
 def test_a_path_in_another_frame_is_false_and_the_log_says_why(client):
     assert not ask(client, message(THROUGH_THE_BOX[:3], frame="odom")).is_valid
     client.wait_for_word("'odom'")
+
+
+def test_a_path_whose_poses_alone_have_another_frame_is_false(client):
+    path = message(THROUGH_THE_BOX[:3])
+    path.header = Header()
+    path.poses[2].header = Header(frame_id="base_link")
+    assert not ask(client, path).is_valid
+    client.wait_for_word("'base_link'")
 
 
 def test_only_what_is_ahead_of_the_vehicle_counts(module_planners, map_file, running):
