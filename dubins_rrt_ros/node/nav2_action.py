@@ -119,8 +119,9 @@ class PathServer:
         request, planner_id = goal.handle.request, goal.handle.request.planner_id
         goals, planner_ids = self._action.goals(request), self._parameters.read().node.planner_ids
         if planner_id not in ("", *planner_ids):
-            return self._refused(path, INVALID_PLANNER, f"planner_id is {quoted_name(planner_id)}; give one of "
-                                                        f"planner_ids: {', '.join(planner_ids)}, or leave it empty.")
+            names = ", ".join(map(quoted_name, filter(None, planner_ids)))
+            remedy = f"give one of planner_ids: {names}, or leave it empty" if names else "leave it empty: planner_ids names none"
+            return self._refused(path, INVALID_PLANNER, f"planner_id is {quoted_name(planner_id)}; {remedy}.")
         if not goals:
             return self._refused(path, NO_VIAPOINTS_GIVEN, "There are no goals; give at least one.")
         answer = _Answer(self._outputs)

@@ -117,6 +117,16 @@ def test_another_planner_is_201(action):
         action.client.set_parameters(planner_ids=["GridBased"])
 
 
+@pytest.mark.parametrize(("names", "words"), [(["A", "b\nc"], "planner_ids: 'A', 'b\\nc', or leave it empty."),
+                                              ([""], "leave it empty: planner_ids names none.")])
+def test_the_names_of_the_planner_are_told_quoted_where_there_are_any(action, names, words):
+    action.client.set_parameters(planner_ids=names)
+    try:
+        assert action.path(GOAL, START, planner_id="Smac")[1].error_msg.endswith(words)
+    finally:
+        action.client.set_parameters(planner_ids=["GridBased"])
+
+
 def test_without_use_start_it_is_planned_from_where_the_vehicle_is(action):
     action.client.send("start_pose", BEHIND)
 
