@@ -61,7 +61,8 @@ def add_arguments(parser: Parser) -> None:
                     "its turning radius, and whether all that the vehicle sweeps, between poses too, is clear of the obstacles.",
         notes="A file of `dubins_rrt plan --json` brings its vehicle, start and goal along; flags replace them. Poses of "
               "another planner, [[x, y, yaw], ...] or {\"poses\": [[x, y, yaw], ...]}, in m and rad, are judged along the arcs "
-              "of constant curvature from each to the next, with the vehicle that the flags describe. All that a plan's file "
+              "of constant curvature from each to the next, with the vehicle that the flags describe; where poses lie so far "
+              "apart that the curvature changes between them, --tolerance-xy allows for it. All that a plan's file "
               "says is compared with its curves and the map, its poses too; what cannot be is named as not judged.",
         examples=[f"dubins_rrt plan {MAP} {ENDS} --json plan.json", f"dubins_rrt audit plan.json {MAP}",
                   "echo '[[1.5, 2, 1.5708], [1.5, 3, 1.5708], [1.5, 4, 1.5708]]' > theirs.json",
