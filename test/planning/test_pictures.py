@@ -1,6 +1,7 @@
 """Pictures from the library: plots on axes, notebooks, animations; and that none of it is imported before it is asked for."""
 
 import io
+import math
 import re
 import subprocess
 import sys
@@ -10,10 +11,11 @@ import matplotlib.figure
 import matplotlib.pyplot
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 from support.cases import empty_map, needs_compiled
 
-from dubins_rrt_ros.planning import GridMap, PictureError, Problem, Settings, Vehicle, pictures, plan, plan_through
+from dubins_rrt_ros.planning import GridMap, PictureError, Problem, Settings, Vehicle, load_map, pictures, plan, plan_through
 from dubins_rrt_ros.planning.pictures import drawing
 from dubins_rrt_ros.planning.pictures.animation import Recording, _SearchScreen, save_drive
 
@@ -21,6 +23,8 @@ from dubins_rrt_ros.planning.pictures.animation import Recording, _SearchScreen,
 pytestmark = needs_compiled
 
 EVERY, SAMPLES = 7, 60
+#: Settings for a picture that shows poses, whatever is found.
+QUICK = Settings(planner="rrt", planning_time=0.2, seed=1, length_proof=False)
 
 
 @pytest.fixture(autouse=True)
@@ -181,6 +185,30 @@ def test_a_tour_is_animated_as_a_drive(tmp_path, monkeypatch):
     save_drive(str(tmp_path / "drive.gif"), result, drawn.append)
     assert drawn == list(range(1, 13))
     assert Image.open(tmp_path / "drive.gif").n_frames == 12  # none is as the one before
+
+
+def drawn_poses(axes):
+    """The arrows of start and goal, and their names by what they say."""
+    arrows = [patch for patch in axes.patches if isinstance(patch, matplotlib.patches.Polygon)]
+    return arrows, {text.get_text(): text for text in axes.texts if text.get_text() in ("start", "goal")}
+
+
+def test_the_arrow_of_a_wide_vehicle_stays_in_the_picture():
+    axes = matplotlib.figure.Figure().add_subplot()
+    goal = (10.0, 17.5, math.pi / 2)  # 2.5 m below the upper edge
+    plan(Problem(GridMap(np.zeros((100, 100)), 0.2), Vehicle(robot_radius=2.0), (10.0, 3.0, 0.0), goal), QUICK).plot(axes)
+    for arrow in drawn_poses(axes)[0]:
+        assert arrow.get_xy()[:, 1].max() <= axes.get_ylim()[1]
+
+
+def test_a_name_is_beside_its_vehicle_and_not_on_it():
+    axes = matplotlib.figure.Figure(figsize=(8, 6)).add_subplot()
+    goal, car = (22.0, 4.1, -math.pi / 2), Vehicle(5.0, footprint=[[3.6, 0.9], [-0.9, 0.9], [-0.9, -0.9], [3.6, -0.9]])
+    plan(Problem(load_map("parking.geojson"), car, (2.5, 8.75, 0.0), goal), QUICK).plot(axes)  # between two other cars
+    axes.get_figure().canvas.draw()
+    name = drawn_poses(axes)[1]["goal"].get_window_extent().transformed(axes.transData.inverted())
+    body = shapely.box(21.1, 0.5, 22.9, 5.0)
+    assert 0 < shapely.distance(body, shapely.box(*name.extents)) < 1.5
 
 
 @pytest.mark.parametrize("heading", np.linspace(-3, 3, 7).tolist())

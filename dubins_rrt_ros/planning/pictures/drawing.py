@@ -19,7 +19,7 @@ from matplotlib.transforms import Affine2D
 from ..maps.model import GridMap, Map
 from ..problem import Waypoint
 from ..vehicle import Vehicle
-from .names import Names
+from .names import HALF_WIDTH, Names
 from .outlines import body, contour, swept
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ DPI = 160
 MAP_SIDE, LEFT, RIGHT, BOTTOM, TOP, WIDTH = 6.4, 0.62, 0.18, 0.56, 0.52, 5.6
 #: Colour of waypoints, and length of the line along the heading of one, from its middle [pt].
 WAYPOINT, POINTER = "#8a4f7d", 20.0
+#: Least and greatest length of the arrows of start and goal, in longer sides of the view.
+SHORTEST, LONGEST = 0.045, 0.09
 #: Opacity of the area that the vehicle sweeps.
 SWEPT = 0.18
 #: Height of a line below the title [inch], and number of its letters to the inch.
@@ -204,7 +206,8 @@ def frame(axes: Axes, world_map: Map) -> None:
 
 def draw_poses(axes: Axes, drawing: Drawing) -> None:
     """Draw start and goal, each with the vehicle, an arrow and its name, and the waypoints, on axes that `frame` has fitted."""
-    arrow = max(2.2 * drawing.vehicle.inscribed_radius, 0.045 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    side = max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
+    arrow = float(np.clip(2.2 * drawing.vehicle.inscribed_radius, SHORTEST * side, LONGEST * side))
     for pose, colour in ((drawing.start, START), (drawing.goal, GOAL)):
         draw_vehicle(axes, pose, colour, drawing.vehicle)
         _draw_arrow(axes, pose, colour, arrow)
@@ -318,6 +321,7 @@ def draw_vehicle(axes: Axes, pose: Sequence[float], colour: str, vehicle: Vehicl
 
 def _draw_arrow(axes: Axes, pose: Sequence[float], colour: str, length: float) -> None:
     x, y, theta = pose
-    arrow = length * np.array([[0, 0.07], [0.55, 0.07], [0.5, 0.26], [1, 0], [0.5, -0.26], [0.55, -0.07], [0, -0.07]])
+    arrow = length * np.array([
+        [0, 0.07], [0.55, 0.07], [0.5, HALF_WIDTH], [1, 0], [0.5, -HALF_WIDTH], [0.55, -0.07], [0, -0.07]])
     place = Affine2D().rotate(theta).translate(x, y)
     axes.add_patch(Polygon(place.transform(arrow), facecolor=colour, edgecolor="white", linewidth=0.7, zorder=6))

@@ -20,6 +20,8 @@ SIZE, LETTER = 10.0, 6.4
 DIRECTIONS = [math.radians(turn) for turn in (0, 90, -90, 45, -45, 135, -135, 180)]
 #: Number of points across and up a name at which it is looked at what it covers.
 ACROSS, UP = 12, 5
+#: Half the width of the arrow at a pose, in its length.
+HALF_WIDTH = 0.26
 #: Weight of a point outside the picture, and of a pose of the path, in points on an obstacle.
 OUTSIDE, ON_PATH = 100.0, 3.0
 
@@ -56,13 +58,16 @@ class Names:
     def _centre(self, pose: Sequence[float], turn: float, half: np.ndarray) -> np.ndarray:
         """Return the centre of a name, clear of the vehicle and its arrow."""
         direction = np.array([math.cos(pose[2] + turn), math.sin(pose[2] + turn)])
-        reach = max(1.2 * self._vehicle.circumscribed_radius, 0.3 * self._arrow)
-        if abs(math.sin(turn)) > 0.9:
-            reach = max(1.3 * self._vehicle.inscribed_radius, 0.3 * self._arrow)
-        elif math.cos(turn) > 0.9:
-            reach = max(reach, 1.1 * self._arrow)
-        centre: np.ndarray = pose[:2] + direction * (reach + 0.3 * SIZE * self._point + np.abs(direction) @ half)
+        apart = 1.1 * self._reach(turn) + 0.3 * SIZE * self._point + np.abs(direction) @ half
+        centre: np.ndarray = pose[:2] + direction * apart
         return centre
+
+    def _reach(self, turn: float) -> float:
+        """Return how far the vehicle and its arrow reach in a direction that is relative to its heading [m]."""
+        ahead, left = math.cos(turn), math.sin(turn)
+        corners = self._vehicle.footprint
+        body = max(ahead * x + left * y for x, y in corners) if corners else self._vehicle.robot_radius
+        return max(body, self._arrow * ahead, self._arrow * HALF_WIDTH * abs(left))
 
     def _cover(self, centre: np.ndarray, half: np.ndarray) -> float:
         """Return how much a name would cover that should be seen."""
