@@ -113,12 +113,46 @@ def shows_way(view: View) -> bool:
     return all(plan(leg, Settings(planner="rrt", planning_time=JUDGING_TIME, seed=1)).solved for leg in legs)
 
 
+class Places:
+    """Random places on a floor without people, between which ways lead."""
+
+    def __init__(self, floor: Floor, rng: np.random.Generator):
+        self._floor, self._rng = floor, rng
+        self._world = prepare(floor.grid, VEHICLE)
+
+    def home(self) -> tuple[float, float, float]:
+        """Return a pose from which a way leads to others, and back again."""
+        for _ in range(MOST_TRIES):
+            home, other = self._random_pose(0.6), self._random_pose(0.6)
+            if self._leads(home, other, JUDGING_TIME) and self._leads(other, home, JUDGING_TIME):
+                return home
+        raise SystemExit(NO_ROOM)
+
+    def after(self, here: tuple, home: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a pose that a way leads to, and from which one leads home; home itself where none is found."""
+        for _ in range(MOST_TRIES):
+            place = self._random_pose(BODY + MARGIN + 0.15)
+            if math.dist(here[:2], place[:2]) > 2.0 and self._leads(here, place) and self._leads(place, home):
+                return place
+        return home
+
+    def _random_pose(self, room: float) -> tuple[float, float, float]:
+        x, y = self._floor.random_place(room)
+        return float(x), float(y), float(self._rng.uniform(-math.pi, math.pi))
+
+    def _leads(self, start: tuple, goal: tuple, seconds: float = 0.3) -> bool:
+        """Return True if a way leads from a place, which the car may have reached in another direction, to another one."""
+        settings = Settings(planner="rrt", planning_time=seconds, seed=1)
+        starts = [(*start[:2], math.remainder(start[2] + turn, math.tau)) for turn in (0.0, -SLANT, SLANT)]
+        return all(plan(Problem(self._world, start=start, goal=goal), settings).solved for start in starts)
+
+
 class Car:
     """A car with a planner of its own, in a namespace of its own."""
 
     def __init__(self, number: int, floor: Floor, executor: SingleThreadedExecutor, rng: np.random.Generator, log: Path | None):
         self._number, self._floor, self._rng = number, floor, rng
-        self._world = prepare(floor.grid, VEHICLE)  # without people
+        self._places = Places(floor, rng)
         self.namespace = f"/car{number}"
         node = rclpy.create_node("car", namespace=self.namespace)
         executor.add_node(node)
@@ -127,7 +161,7 @@ class Car:
         self._maps = node.create_publisher(OccupancyGrid, "map", LATCHED)
         node.create_subscription(PathMessage, "plan", self._on_plan, LATCHED)
         node.create_subscription(DiagnosticStatus, "planner/status", lambda message: self._course.hear(message), LATCHED)
-        self._home = self._random_home()
+        self._home = self._places.home()
         self.pose = np.array(self._home)
         self._last_place = self._home
         self._curvature = 0.0
@@ -161,37 +195,11 @@ class Car:
         if message.poses and "shortest" not in self.result:
             self.result["shortest"] = self._course.length
 
-    def _random_pose(self, room: float) -> tuple[float, float, float]:
-        x, y = self._floor.random_place(room)
-        return float(x), float(y), float(self._rng.uniform(-math.pi, math.pi))
-
-    def _random_home(self) -> tuple[float, float, float]:
-        """Return a pose from which a way leads to others, and back again."""
-        for _ in range(MOST_TRIES):
-            home, other = self._random_pose(0.6), self._random_pose(0.6)
-            if self._leads(home, other, JUDGING_TIME) and self._leads(other, home, JUDGING_TIME):
-                return home
-        raise SystemExit(NO_ROOM)
-
-    def _leads(self, start: tuple, goal: tuple, seconds: float = 0.3) -> bool:
-        """Return True if a way leads from a place, which the car may have reached in another direction, to another one."""
-        settings = Settings(planner="rrt", planning_time=seconds, seed=1)
-        starts = [(*start[:2], math.remainder(start[2] + turn, math.tau)) for turn in (0.0, -SLANT, SLANT)]
-        return all(plan(Problem(self._world, start=start, goal=goal), settings).solved for start in starts)
-
-    def _next_place(self, here: tuple) -> tuple[float, float, float]:
-        """Return a pose that a way leads to, and from which one leads home; home itself where none is found."""
-        for _ in range(MOST_TRIES):
-            place = self._random_pose(BODY + MARGIN + 0.15)
-            if math.dist(here[:2], place[:2]) > 2.0 and self._leads(here, place) and self._leads(place, self._home):
-                return place
-        return self._home
-
     def choose_goal(self) -> None:
         """Ask for a path to a place, sometimes over another one."""
-        places = [self._next_place(self._last_place)]
+        places = [self._places.after(self._last_place, self._home)]
         if len(self.results) % 3 == 2:
-            places.append(self._next_place(places[0]))
+            places.append(self._places.after(places[0], self._home))
         self._last_place = places[-1]
         self._route = [np.array(place) for place in places]
         self.result = {"car": self.namespace, "goal": [round(a, 3) for a in places[-1]], "waypoints": len(places) - 1,

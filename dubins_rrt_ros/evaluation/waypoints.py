@@ -69,7 +69,7 @@ def main() -> int:
 
 def compare(world: World, seed: int, headings: int, planning_time: float) -> dict[str, float]:
     """Return the length of a path over two random waypoints, that of the reference, that of leg by leg [m], and its time [s]."""
-    start, *places, goal = _random_poses(world, np.random.default_rng(seed))
+    start, *places, goal = random_poses(world, np.random.default_rng(seed))
     answer = plan_through(Problem(world, start=start, goal=goal), [place[:2] for place in places],
                           replace(WHOLE, planning_time=planning_time))
     turns = (np.arange(headings) * math.tau / headings - math.pi).tolist()
@@ -122,7 +122,7 @@ def _sum(legs: list[_Leg], chain: list[int]) -> float:
     return sum(float(leg.lengths[i, j]) for leg, (i, j) in zip(legs, pairwise(chain), strict=True))
 
 
-def _random_poses(world: World, rng: np.random.Generator) -> list[Pose]:
+def random_poses(world: World, rng: np.random.Generator) -> list[Pose]:
     """Draw four free poses of which each can be reached from the one before; others where one leads nowhere."""
     corners = world.map.corners()
     poses: list[Pose] = []

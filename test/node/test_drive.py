@@ -1,6 +1,7 @@
 """Seconds and a minute of driving with the node, on a map that changes: examples/drive.py, as a user starts it."""
 
 import importlib
+import itertools
 import json
 import os
 import subprocess
@@ -76,6 +77,18 @@ def test_a_planner_is_not_blamed_for_somebody_in_the_only_way_far_ahead(drive):
     assert judged["without_path"] == 5.0
     assert judged["standstill"] == pytest.approx(1.2)
     assert judged["pose"] == list(start) and judged["places"] == [list(goal)]
+
+
+def test_a_home_is_found_on_a_busy_machine(drive, monkeypatch):
+    """By a clock that goes on by 10 ms with each look at it, so that a path takes a second."""
+    looks = itertools.count()
+    open_floor = GridMap(np.zeros((200, 200), np.int8), 0.05, (0.0, 0.0, 0.0), percent=True)
+    places = drive.Places(drive.Floor(open_floor, np.random.default_rng(0)), np.random.default_rng(1))
+    monkeypatch.setattr("dubins_rrt_ros.planning.deadline.time.perf_counter", lambda: 0.01 * next(looks))
+    home = places.home()
+    assert places.after(home, home) == home  # goals are given up sooner
+    monkeypatch.undo()
+    assert places.after(home, home) != home
 
 
 @pytest.fixture
