@@ -45,12 +45,12 @@ def too_high(ahead: np.ndarray, boxes: np.ndarray, radius: float, margin: float)
 
 def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
     """Return lower bounds of the curves from each of (n, 11) boxes to the box of the same row, at most `enough` (n,) [m]."""
-    least = np.minimum(_least_of_whole(a, b, radius, enough), enough)
+    least = np.minimum(_least_of_whole(a, b, radius), enough)
     short = np.flatnonzero(least < enough)
     if halvings == 0 or not 0 < len(short) <= MAX_PAIRS:
         return least
     # No more can be shown than for the poses in the middle: a little less is enough where that is too short.
-    middles = _least_of_whole(a[short] * MIDDLE, b[short] * MIDDLE, radius, enough[short])
+    middles = _least_of_whole(a[short] * MIDDLE, b[short] * MIDDLE, radius)
     wanted = np.where(middles < enough[short], np.maximum(middles - SHORT * radius, least[short]), enough[short])
     some = least[short] < wanted
     short, wanted = short[some], wanted[some]
@@ -77,15 +77,11 @@ def part(boxes: np.ndarray, low: np.ndarray | int, high: np.ndarray | int) -> np
     return boxes
 
 
-def _least_of_whole(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray) -> np.ndarray:
-    """Bound the lengths of all six words where the distance is not enough."""
-    least = _distance(a, b)
-    some = np.flatnonzero(least < enough)
-    a, b = a[some], b[some]
+def _least_of_whole(a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
+    """Bound the lengths of all six words, by the distance too."""
     words = [_turn_straight_turn(a, b, first, last, radius) for first in (LEFT, RIGHT) for last in (LEFT, RIGHT)]
     words += [_three_turns(a, b, first, radius) for first in (LEFT, RIGHT)]
-    least[some] = np.maximum(least[some], np.min(words, axis=0))
-    return least
+    return np.asarray(np.maximum(_distance(a, b), np.min(words, axis=0)))
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -75,22 +75,17 @@ def _finite(number: str) -> float:
     return float(number)
 
 
-def _demand(holds: Any, otherwise: str) -> None:
-    if not holds:
-        raise Refused(otherwise)
+def _demand(holds: Any, otherwise: str, world: World | None = None, points: Any = None) -> None:
+    """Refuse unless something holds, or all of it; of points of the map's own frame the first that lacks it is told."""
+    for missing in np.flatnonzero(~np.asarray(holds, dtype=bool)):
+        raise Refused(otherwise if world is None else f"{otherwise} at {_place(world, points[missing])}")
 
 
 def _place(world: World, point: np.ndarray) -> list[float]:
     """Return x and y of a point of the map's own frame in that of the poses, as messages have them [m]."""
-    x, y, yaw = world.origin
+    (x, y, yaw), (across, up, *_) = world.origin, point.tolist()
     c, s = math.cos(yaw), math.sin(yaw)
-    return [round(x + c * float(point[0]) - s * float(point[1]), 3), round(y + s * float(point[0]) + c * float(point[1]), 3)]
-
-
-def _demand_each(world: World, holds: np.ndarray, points: np.ndarray, otherwise: str) -> None:
-    """Demand something of each of some points of the map's own frame; the place of the first without it is told."""
-    if len(missing := np.flatnonzero(~holds)):
-        raise Refused(f"{otherwise} at {_place(world, points[missing[0]])}")
+    return [round(x + c * across - s * up, 3), round(y + s * across + c * up, 3)]
 
 
 def _check_path(document: dict[str, Any], world: World) -> None:
@@ -173,16 +168,16 @@ class _Bound:
         for which in (FROM_START, TO_GOAL):
             slopes = np.linalg.norm(gradients(squares.triangles(which, *np.nonzero(squares.domain))), axis=-1)
             is_flat = np.all(slopes <= squares.side * (1 - 5e-11), axis=1)
-            _demand_each(self._world, is_flat, middles, "a potential is steeper than 1")
+            _demand(is_flat, "a potential is steeper than 1", self._world, middles)
         around = np.pad(squares.domain, 2)
         near = sliding_window_view(around, (3, 3)).any(axis=(2, 3)) & ~around[1:-1, 1:-1]
         points = squares.corner + squares.side * (np.argwhere(near)[:, ::-1] - 0.5)
         for _ in range(SQUARE_HALVINGS):
             room = self._room(points)
-            _demand_each(self._world, room < self._inner, points, "the vehicle may be outside of all squares")
+            _demand(room < self._inner, "the vehicle may be outside of all squares", self._world, points)
             points, half = points[room + half * math.sqrt(2) >= self._inner], half / 2
             points = (points[:, None] + half * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])).reshape(-1, 2)
-        _demand_each(self._world, np.zeros(len(points), bool), points, "the vehicle may be outside of all squares")
+        _demand(np.zeros(len(points), bool), "the vehicle may be outside of all squares", self._world, points)
 
     def _room(self, points: np.ndarray) -> np.ndarray:
         return self._world.clearances(points, self._inner) + self._margin
@@ -218,10 +213,10 @@ class _Bound:
         boxes = boxes_on(gates[gate], table, self._margin)
         closed = np.isnan(boxes[:, 8])
         room = self._room(boxes[closed, :2]) + boxes[closed, 4]
-        _demand_each(self._world, room < self._inner, boxes[closed], "a box that may be free has no potential")
+        _demand(room < self._inner, "a box that may be free has no potential", self._world, boxes[closed])
         steps = ways(crossings, start, goals)
         for number in np.flatnonzero(steps.any(axis=0)[portal]):
-            _demand(_covers(table[gate == number]), f"boxes do not cover a level at {_place(self._world, gates[number])}")
+            _demand(_covers(table[gate == number]), "boxes do not cover a level", self._world, gates[[number]])
         on_portals = [boxes[~closed & (portal[gate] == number)] for number in range(len(crossings))]
         self._check_steps(steps, [*on_portals, self._start_box, *[self._goal_boxes] * len(goals)], enough)
 

@@ -26,15 +26,11 @@ def poses_in(boxes, rng):
                             boxes[:, 1] + along * boxes[:, 3] + across * boxes[:, 2], boxes[:, 6] + share[2] * boxes[:, 7]])
 
 
-def unlimited(count):
-    return np.full(count, 1e3)
-
-
 @pytest.mark.parametrize("size", [0.02, 0.3, 2.0])
 def test_no_bound_is_above_a_curve(size):
     rng = np.random.default_rng(1)
     a, b = (random_boxes(rng, 800, size) for _ in range(2))
-    found = bounds._least_of_whole(a, b, 0.7, unlimited(800))
+    found = bounds._least_of_whole(a, b, 0.7)
     least = np.min([lengths(poses_in(a, rng), poses_in(b, rng), 0.7) for _ in range(scaled(200))], axis=0)
     assert (found <= least + 1e-9).all() and (found > 0.5 * least).mean() > 0.3
 
@@ -43,7 +39,7 @@ def test_between_poses_the_bound_is_the_curve_but_for_three_turns():
     rng = np.random.default_rng(2)
     a, b = (random_boxes(rng, 2000, 0.0) for _ in range(2))
     a[:1000, :2] *= 0.3  # near enough for three turns
-    found, least = bounds._least_of_whole(a, b, 0.7, unlimited(2000)), lengths(poses_in(a, rng), poses_in(b, rng), 0.7)
+    found, least = bounds._least_of_whole(a, b, 0.7), lengths(poses_in(a, rng), poses_in(b, rng), 0.7)
     assert (found <= least + 1e-9).all()
     assert (np.abs(found - least) < 1e-9).mean() > 0.85 and (found > 0.6 * least).all()
 
@@ -95,9 +91,8 @@ def test_rounding_loses_as_little_as_is_said(size, monkeypatch):
     rng = np.random.default_rng(5)
     a, b = (random_boxes(rng, 3000, size) for _ in range(2))
     scale = 10.0  # metres, about the longest curve between them
-    found = bounds._least_of_whole(a, b, 0.7, unlimited(3000))
+    found = bounds._least_of_whole(a, b, 0.7)
     monkeypatch.setattr(bounds, "TAU", 8 * np.arctan(np.longdouble(1)))
-    long = bounds._least_of_whole(a.astype(np.longdouble), b.astype(np.longdouble), np.longdouble(0.7),
-                                  unlimited(3000).astype(np.longdouble))
+    long = bounds._least_of_whole(a.astype(np.longdouble), b.astype(np.longdouble), np.longdouble(0.7))
     assert long.dtype == np.longdouble
     assert (np.abs(found - long) <= LOST * scale).all()
