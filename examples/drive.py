@@ -321,10 +321,10 @@ def drive(cars: list[Car], floor: Floor, executor: SingleThreadedExecutor, minut
 def main() -> int:
     """Drive, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--minutes", type=float, default=1.0)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--map", default="maze", help="map file, or the name of an installed map")
-    parser.add_argument("--robots", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=1.0, help="how long to drive; default 1")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the goals, the people and the noise; default 0")
+    parser.add_argument("--map", default="maze", help="map file, or the name of an installed map; default maze")
+    parser.add_argument("--robots", type=int, default=1, help="number of cars, each with a planner of its own; default 1")
     parser.add_argument("--log", type=Path, help="folder for the logs of the planners")
     arguments = parser.parse_args()
     grid = load_map(find_map(arguments.map))
