@@ -1,5 +1,7 @@
 """Poses in the global frame: those of messages, and the vehicle's by its transform."""
 
+from typing import NamedTuple
+
 from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from rclpy.node import Node
@@ -17,6 +19,20 @@ from .transforms import transforms
 
 #: What to install for transforms.
 REMEDY = "neither tf2_ros nor tf2_msgs is installed (ros-jazzy-tf2-ros-py)"
+
+
+class _Source(NamedTuple):
+    """A frame from which a pose is to be transformed.
+
+    Attributes:
+        frame: its name.
+        subject: what is in it, as the subject of a sentence, with the frame's name.
+        alternative: what to do other than to provide the transform.
+    """
+
+    frame: str
+    subject: str
+    alternative: str
 
 
 class Frames:
@@ -60,7 +76,8 @@ class Frames:
         if not frame:
             self._logger.warning(f"A {name} pose without frame_id is taken to be in '{self._frame}'", once=True)
         elif frame != self._frame:
-            pose = transformed(pose, self._lookup(name, frame, nanoseconds(message.header.stamp) or None)[0])
+            source = _Source(frame, f"The {name} pose is in frame {quoted_name(frame)}", f"publish the pose in '{self._frame}'")
+            pose = transformed(pose, self._lookup(source, nanoseconds(message.header.stamp) or None)[0])
         try:
             planar = pose_from(name, pose)
         except InvalidPose as error:
@@ -81,10 +98,12 @@ class Frames:
             Refusal: transforms are not known at all, or it is no pose in the plane.
         """
         options = self._parameters.read().node
-        found, stamp = self._lookup("start", options.robot_base_frame, None)
+        source = _Source(options.robot_base_frame, f"The start is the vehicle's frame {quoted_name(options.robot_base_frame)}",
+                         "leave robot_base_frame empty and publish start_pose")
+        found, stamp = self._lookup(source, None)
         if stamp is not None and (age := (self._clock.now().nanoseconds - stamp) / 1e9) > options.transform_max_age:
-            raise self._not_yet("start", options.robot_base_frame, f"the latest transform is {age:.1f} s old, more than "
-                                                                   f"transform_max_age ({options.transform_max_age:g} s)")
+            raise self._not_yet(source, f"the latest transform is {age:.1f} s old, more than transform_max_age "
+                                        f"({options.transform_max_age:g} s); publish it more often, raise transform_max_age")
         try:
             return pose_from("start", transformed(PoseMessage(), found))
         except InvalidPose as error:
@@ -97,22 +116,22 @@ class Frames:
                 self._doubts.add((name, kind))
                 self._logger.warning(doubt)
 
-    def _lookup(self, name: str, frame: str, stamp: int | None) -> tuple[Rigid, int | None]:
-        if frame.startswith("/"):
-            raise self._refusal(name, frame, "tf2 knows no frames with a leading slash; leave it out, or")
+    def _lookup(self, source: _Source, stamp: int | None) -> tuple[Rigid, int | None]:
+        if source.frame.startswith("/"):
+            raise self._refusal(source, "tf2 knows no frames with a leading slash; leave it out")
         if self._transforms is None:
-            raise self._refusal(name, frame, f"{REMEDY}; install one, or")
+            raise self._refusal(source, f"{REMEDY}; install one")
         try:
-            return self._transforms.lookup(self._frame, frame, stamp)
+            return self._transforms.lookup(self._frame, source.frame, stamp)
         except TransformUnknown as error:
             if error.is_final and stamp is not None:  # the latest may always come
-                raise self._refusal(name, frame, f"{error}; send it sooner, or") from None
-            raise self._not_yet(name, frame, str(error)) from None
+                raise self._refusal(source, f"{error}; send it sooner") from None
+            raise self._not_yet(source, f"{error}; {error.remedy}") from None
 
-    def _not_yet(self, name: str, frame: str, why: str) -> NotYet:
-        refusal = self._refusal(name, frame, f"{why}; publish that transform, or", is_final=False)
+    def _not_yet(self, source: _Source, why: str) -> NotYet:
+        refusal = self._refusal(source, why, is_final=False)
         return NotYet("a transform", self._parameters.read().node.transform_tolerance, lambda: refusal)
 
-    def _refusal(self, name: str, frame: str, why: str, is_final: bool = True) -> Refusal:
-        return Refusal(Status.TF_ERROR, f"The {name} pose is in frame {quoted_name(frame)} and cannot be transformed to "
-                                        f"'{self._frame}': {why} publish the pose in '{self._frame}'.", is_final)
+    def _refusal(self, source: _Source, why: str, is_final: bool = True) -> Refusal:
+        return Refusal(Status.TF_ERROR, f"{source.subject} and cannot be transformed to '{self._frame}': {why}, or "
+                                        f"{source.alternative}.", is_final)

@@ -67,6 +67,9 @@ class NodeOptions:
             raise OptionError("global_frame is ''; give the name of a frame, such as map")
         for name in ("global_frame", "robot_base_frame"):
             _check_frame(name, getattr(self, name))
+        if self.robot_base_frame == self.global_frame:
+            raise OptionError(f"robot_base_frame is {quoted_name(self.robot_base_frame)}, as global_frame is, so that the "
+                              "vehicle would never move; give the vehicle's frame, such as base_link")
         if self.free_thresh >= self.occupied_thresh:
             raise OptionError(f"free_thresh is {self.free_thresh:g} and occupied_thresh {self.occupied_thresh:g}; make "
                               "free_thresh the smaller one")

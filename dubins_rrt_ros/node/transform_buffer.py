@@ -17,11 +17,12 @@ class TransformUnknown(Exception):
 
     Attributes:
         is_final: True if it can no longer come.
+        remedy: what would make it known.
     """
 
-    def __init__(self, message: str, is_final: bool = False):
+    def __init__(self, message: str, is_final: bool = False, remedy: str = "publish that transform"):
         super().__init__(message)
-        self.is_final = is_final
+        self.is_final, self.remedy = is_final, remedy
 
 
 @dataclass
@@ -132,6 +133,7 @@ class TransformBuffer:
         while names[-1] in self._frames:
             parent = self._frames[names[-1]].parent
             if parent in names:
-                raise TransformUnknown(f"{quoted_name(name)} is its own ancestor")
+                raise TransformUnknown(f"{quoted_name(name)} is its own ancestor, by {quoted_name(parent)}",
+                                       remedy="end one of the publishers that give their frames parents in a circle")
             names.append(parent)
         return names

@@ -17,6 +17,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 
+from dubins_rrt_ros.planning.text import quoted_name
+
 from .conversions import nanoseconds, rigid_from
 from .executor_queue import steady_timer
 from .rigid import Rigid
@@ -133,11 +135,17 @@ class OwnBuffer(TransformBuffer):
 
     def __init__(self, listener: Node):
         super().__init__()
+        self._logger = listener.get_logger()
         listener.create_subscription(TFMessage, "/tf", partial(self._hear, is_static=False), TF)
         listener.create_subscription(TFMessage, "/tf_static", partial(self._hear, is_static=True), TF_STATIC)
 
     def _hear(self, message: Any, is_static: bool) -> None:
         for transform in message.transforms:
-            pose, parent, child = rigid_from(transform.transform), transform.header.frame_id, transform.child_frame_id
+            # As tf2 does, which leaves out the slash that names had in ROS 1.
+            parent, child = transform.header.frame_id.removeprefix("/"), transform.child_frame_id.removeprefix("/")
+            pose = rigid_from(transform.transform)
             if pose is not None and parent and child and parent != child:
                 self.add(parent, child, nanoseconds(transform.header.stamp), pose, is_static)
+            else:
+                self._logger.warning(f"A transform from {quoted_name(parent)} to {quoted_name(child)} is ignored: its numbers "
+                                     "have to be finite, its quaternion normalised, and its frames two with names", once=True)

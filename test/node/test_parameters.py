@@ -229,6 +229,10 @@ def test_a_frame_that_tf2_does_not_know_is_refused(declared, name, frame, remedy
     assert remedy in str(refusal.value) and str(refusal.value).isprintable()
 
 
+def test_a_vehicle_s_frame_that_is_the_map_s_is_refused(declared):
+    assert "would never move" in change(declared(global_frame="world"), robot_base_frame="world").reason
+
+
 def test_a_refusal_names_the_other_values_only_where_they_matter(declared):
     node, together = declared(), "change what belongs together in one call of /holder/set_parameters_atomically"
     assert together in change(node, wheelbase=2.0).reason and together in change(node, free_thresh=0.9).reason

@@ -1,5 +1,6 @@
 """Starts and goals by tf, from another process: whichever keeps the transforms, tf2_ros or our own buffer, answers alike."""
 
+import importlib.util
 import math
 import time
 
@@ -37,7 +38,7 @@ class Broadcaster:
         client.wait_for(lambda: self._tf.get_subscription_count() and self._static.get_subscription_count(), "a listener")
 
     def name(self, frame):
-        return frame if frame == "map" else f"{frame}_{self._suffix}"
+        return frame if frame in ("map", "/map") else f"{frame}_{self._suffix}"
 
     def now(self, ago=0.0):
         return self.client.node.get_clock().now().nanoseconds - round(ago * 1e9)
@@ -97,6 +98,21 @@ def test_the_start_is_the_vehicle_s_frame_at_the_moment_of_planning(drive):
     assert "Waiting for a start" not in process.output.rpartition("The map is ready")[2].rpartition("Path of")[0][200:]
 
 
+def test_the_slash_that_names_of_frames_had_in_ros_1_is_left_out(drive):
+    client, tf, _ = drive()
+    follow(client, tf)
+    tf.send("/map", "/base", START)
+    goal_told(client, tf.goal(GOAL, "map"), samples="300")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("tf2_ros") is not None, reason="tf2 itself tells then")
+@pytest.mark.parametrize(("child", "x"), [("base", math.nan), ("map", 1.5)])
+def test_a_transform_that_is_none_is_ignored_and_the_log_says_why(drive, child, x):
+    client, tf, _ = drive()
+    tf.send("map", child, (x, 5.0, 0.0))
+    client.wait_for_word(f"A transform from 'map' to '{tf.name(child)}' is ignored: ")
+
+
 def test_starts_by_topic_are_not_taken_then(drive):
     client, tf, _ = drive()
     follow(client, tf)
@@ -128,6 +144,7 @@ def test_one_that_does_not_come_is_told_and_the_goal_is_planned_when_it_comes(dr
     follow(client, tf)
     told = goal_told(client, tf.goal(GOAL, "map"), error_name="TF_ERROR")
     assert tf.name("base") in told["message"] and told["level"] == DiagnosticStatus.ERROR
+    assert "leave robot_base_frame empty and publish start_pose" in told["message"]  # where it is set no start by topic is taken
     client.wait_for(lambda: client.statuses[-1].message.startswith("Waiting for a transform: "), "what it waits for")
 
     def planned():
@@ -157,7 +174,7 @@ def test_a_transform_of_the_vehicle_that_is_too_old_is_an_error_with_its_age(dri
     follow(client, tf)
     tf.send("map", "base", START, stamp=tf.now(ago=3600))
     told = goal_told(client, tf.goal(GOAL, "map"), error_name="TF_ERROR")
-    assert "3600." in told["message"] and "transform_max_age (1 s)" in told["message"]
+    assert "3600." in told["message"] and "transform_max_age (1 s); publish it more often, raise" in told["message"]
 
 
 def test_a_goal_is_transformed_at_its_stamp_and_at_the_latest_time_where_that_is_zero(drive):
