@@ -56,43 +56,56 @@ def find_free_squares(clearance: Clearance, block: cython.int, required_clearanc
                     free[row // block + 1, column // block + 1] = 1
 
 
-def greatest_clearances(clearance: Clearance, block: cython.int, free: cython.schar[:, ::1], enough: cython.double,
-                        parts: cython.int, farther: cython.double):
-    """Bound the clearance anywhere in each of the `free_squares`, by that in the middles of `parts` x `parts` parts of it.
+def clearance_slowness(clearance: Clearance, block: cython.int, free: cython.schar[:, ::1], required_clearance: cython.double,
+                       preferred_clearance: cython.double, weight: cython.double, parts: cython.int, farther: cython.double):
+    """Find what a metre costs in each of the `free_squares` by its room, that in the middles of `parts` x `parts` parts of it.
 
     Args:
         block, free: as for `free_squares`.
-        enough: clearance above which it does not matter [m].
-        farther: added to the clearances in the middles, in diagonals of a part: 0.5 makes an upper bound.
+        required_clearance, preferred_clearance, weight: of the cost, as `_kernels/edge_cost.py` says [m].
+        farther: added to the clearances in the middles, in diagonals of a part: 0.5 makes the costs lower bounds.
 
     Returns:
-        Like `free_squares`, float64 [m]; 0 for other squares.
+        Like `free_squares`, float64; 1 for other squares.
     """
-    found = np.zeros((free.shape[0], free.shape[1]))
+    found = np.ones((free.shape[0], free.shape[1]))
     out: cython.double[:, ::1] = found
     side: cython.double = block * clearance.resolution / parts
+    # A square at the map's edge can reach beyond it.
+    middles = np.minimum((np.arange((found.shape[1] - 3) * parts) + 0.5) * side, clearance.width)
+    x: cython.double[::1] = middles
+    cells: cython.int[::1] = np.minimum(middles / clearance.resolution, clearance.field.shape[1] - 1).astype(np.int32)
+    greatest: cython.double[::1] = np.empty(found.shape[1])
+    enough: cython.double = required_clearance + preferred_clearance
     row: cython.int
     column: cython.int
     part: cython.int
-    x: cython.double
+    i: cython.int
+    cell_row: cython.int
     y: cython.double
     bound: cython.double
+    lack: cython.double
     farther *= side * sqrt(2.0)
     with cython.nogil:
         for row in range(1, cython.cast(cython.int, free.shape[0]) - 2):
+            greatest[:] = 0
+            for part in range(parts):
+                y = min(((row - 1) * parts + part + 0.5) * side, clearance.height)
+                cell_row = clearance.row_of(y)
+                for column in range(1, cython.cast(cython.int, free.shape[1]) - 2):
+                    if not free[row, column]:
+                        continue
+                    for i in range((column - 1) * parts, column * parts):
+                        if greatest[column] >= enough:
+                            break
+                        bound = cython.cast(cython.double, clearance.field[cell_row, cells[i]])
+                        if bound < enough:
+                            bound = clearance.exact(x[i], y)
+                        greatest[column] = max(greatest[column], bound + farther)
             for column in range(1, cython.cast(cython.int, free.shape[1]) - 2):
-                if not free[row, column]:
-                    continue
-                for part in range(parts * parts):
-                    # A square at the map's edge can reach beyond it.
-                    x = min(((column - 1) * parts + part % parts + 0.5) * side, clearance.width)
-                    y = min(((row - 1) * parts + part // parts + 0.5) * side, clearance.height)
-                    bound = cython.cast(cython.double, clearance.field[clearance.row_of(y), clearance.column_of(x)])
-                    if bound < enough:
-                        bound = clearance.exact(x, y)
-                    out[row, column] = max(out[row, column], bound + farther)
-                    if out[row, column] >= enough:
-                        break
+                lack = 1 - max(0.0, greatest[column] - required_clearance) / preferred_clearance
+                if free[row, column] and lack > 0:
+                    out[row, column] = 1 + weight * (lack * lack)
     return found
 
 

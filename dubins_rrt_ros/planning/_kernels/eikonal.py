@@ -321,15 +321,24 @@ class Eikonal:
         return sqrt(min(upwards, across)) if upwards > 1 and across > 1 else 1.0
 
 
-def node_slowness(free, slowness):
+def node_slowness(free: cython.schar[:, ::1], slowness: cython.double[:, ::1]):
     """Return the least slowness of the free squares around each node, (rows, columns) float64; 1 where there is none."""
-    least = np.full(free.shape, np.inf)
-    of_free = np.where(free != 0, slowness, np.inf)
-    for rows, columns in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        height, width = free.shape[0] - rows, free.shape[1] - columns
-        np.minimum(least[rows:, columns:], of_free[:height, :width], out=least[rows:, columns:])
-    least[np.isinf(least)] = 1
-    return least
+    found = np.ones((free.shape[0], free.shape[1]))
+    out: cython.double[:, ::1] = found
+    row: cython.int
+    column: cython.int
+    i: cython.int
+    least: cython.double
+    with cython.nogil:
+        for row in range(1, cython.cast(cython.int, free.shape[0])):
+            for column in range(1, cython.cast(cython.int, free.shape[1])):
+                least = FAR
+                for i in range(4):
+                    if free[row - (i >> 1), column - (i & 1)]:
+                        least = min(least, slowness[row - (i >> 1), column - (i & 1)])
+                if least < FAR:
+                    out[row, column] = least
+    return found
 
 
 def squared_slopes(here, right, above, beyond):

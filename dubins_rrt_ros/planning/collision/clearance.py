@@ -19,7 +19,7 @@ from .._kernels import COMPILED
 from .._kernels.clearance import GridClearance, PolygonClearance
 from .._kernels.collision import CollisionChecker, PolygonChecker, TestedChecker
 from .._kernels.components import label_components
-from .._kernels.cost_to_go import find_free_squares, free_squares, greatest_clearances
+from .._kernels.cost_to_go import clearance_slowness, find_free_squares, free_squares
 from .._kernels.eikonal import node_slowness
 from .._kernels.room import CornerIndex, FootprintRoom, Room
 from ..curves.dubins import DubinsCurve
@@ -255,10 +255,8 @@ class ClearanceField:
             cells, squares = self.free_squares(required_clearance)
             of_squares = np.ones(squares.shape)
             if weight > 0:
-                clearances = greatest_clearances(self.kernel, cells, squares, required_clearance + preferred_clearance,
-                                                 *((BOUND_PARTS, 0.5) if is_bound else (ESTIMATE_PARTS, 0.0)))
-                room = np.maximum(clearances - required_clearance, 0)
-                of_squares = 1 + weight * np.maximum(0, 1 - room / preferred_clearance)**2
+                of_squares = clearance_slowness(self.kernel, cells, squares, required_clearance, preferred_clearance, weight,
+                                                *((BOUND_PARTS, 0.5) if is_bound else (ESTIMATE_PARTS, 0.0)))
             if self.cost_cells and cell_weight > 0:
                 of_squares[1:-2, 1:-2] += cell_weight * self.cost_cells.of_squares(cells, is_bound)
             self._slowness[is_bound] = kept = key, (of_squares, node_slowness(squares, of_squares))
