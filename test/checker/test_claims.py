@@ -172,6 +172,14 @@ def test_no_square_with_a_free_place_may_be_left_out(name, tmp_path):
         assert "the vehicle may be outside of all squares at [" in verdict(changed, certified.file, tmp_path)
 
 
+@pytest.mark.parametrize(("halvings", "said"), [(3, "the vehicle may be outside of all squares at ["), (4, "")])
+def test_squares_that_are_not_cut_often_enough_to_tell_are_refused(halvings, said, tmp_path, monkeypatch):
+    """In the middle of each of their parts there is no room."""
+    monkeypatch.setattr(checker, "SQUARE_HALVINGS", halvings)
+    found = refusal(recorded("polygons"), tmp_path)
+    assert said in found and bool(said) == bool(found)
+
+
 def test_no_box_with_a_free_place_goes_without_a_potential(tmp_path):
     """Also where there is no room in its middle."""
     judged = 0

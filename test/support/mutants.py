@@ -19,8 +19,8 @@ import pytest
 
 #: Numbers that are smaller, and not 0, are allowances for rounding.
 LEAST = 1e-3
-#: Maximum CPU time of the tests of a mutant [s]; one that goes on for ever is found.
-SECONDS = 60
+#: Maximum CPU time [s] and memory [bytes] of the tests of a mutant; one that goes on for ever is found.
+SECONDS, BYTES = 60, 3 * 2**30
 #: Functions that take each other's places.
 TWINS = {name: other for pair in (("minimum", "maximum"), ("min", "max"), ("argmin", "argmax"), ("any", "all"), ("sin", "cos"),
                                   ("floor", "ceil")) for name, other in (pair, pair[::-1])}
@@ -132,6 +132,7 @@ def is_found(mutant):
     child = os.fork()
     if child == 0:
         resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+        resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
         os.dup2(silent, 2)
