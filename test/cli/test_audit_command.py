@@ -171,8 +171,8 @@ def test_what_is_not_judged_is_named(document, capsys):
     file = write(document | {"colour": "red"})
     status, out, _ = run(file, "hall.wkt", "--json", "verdict.json", capsys=capsys)
     named = ["message", "found_by", "samples", "tree_nodes", "time_to_first", "time_to_found", "planning_time", "map_time",
-             "lower_bound (that no path is shorter)", "cost_lower_bound (that no path costs less)", "work", "map", "version",
-             "colour"]
+             "lower_bound (that no path is shorter)", "cost_lower_bound (that no path costs less)", "work", "map",
+             "settings (by which it was sought)", "version", "colour"]
     assert status == 0 and out.endswith(f"Not judged: {', '.join(named)}.\n")
     assert json.loads(Path("verdict.json").read_text())["not_judged"] == named
     status, out, _ = run(file, "hall.wkt", "--robot-radius", "0.25", capsys=capsys)
@@ -223,6 +223,15 @@ def test_an_echoed_path_message_is_judged(capsys):
     assert status == 0 and "length 7.900 m" in out
     Path("path.yaml").write_text(echoed(6.29))
     assert run("path.yaml", "hall.wkt", *DISC, capsys=capsys)[0] == 1
+    Path("path.yaml").write_text(echoed(8.0) + echoed(6.29))
+    assert "path.yaml: holds 2 messages; give one" in refusal("path.yaml", "hall.wkt", *DISC, capsys=capsys)
+
+
+@pytest.mark.parametrize("nothing", ["header:\n  frame_id: map\nposes: []\n---\n", "x,y,theta\n"])
+def test_a_path_without_poses_is_told_as_such(nothing, capsys):
+    """As the node publishes it where there is none."""
+    Path("path").write_text(nothing)
+    assert "path: holds a path without poses" in refusal("path", "hall.wkt", *DISC, capsys=capsys)
 
 
 def test_poses_that_are_off_are_found_unless_the_tolerances_allow_it(capsys):

@@ -65,6 +65,13 @@ def test_bad_yaml(tmp_path, content, word):
     assert word in refusal(tmp_path / "bad.yaml", MapMetadataError)
 
 
+@pytest.mark.parametrize("written", ["Image", "imgae", "IMAGE"])
+def test_a_field_that_is_missing_but_for_its_spelling_is_told(tmp_path, written):
+    path = write_grid(tmp_path)
+    path.write_text(path.read_text().replace("image:", f"{written}:"))
+    assert f"m.yaml: image is missing (there is '{written}'); give the name" in refusal(path, MapMetadataError)
+
+
 @pytest.mark.parametrize("again", ["resolution: 0.2", "image: n.pgm", '"resolution": 0.05', "other: {a: 1, b: 2, a: 3}"])
 def test_a_key_that_is_given_twice_is_refused(tmp_path, again):
     path = write_grid(tmp_path)

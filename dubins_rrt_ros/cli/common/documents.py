@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import stat
 from typing import Any
 
@@ -21,6 +22,8 @@ CSV_HEADER = ("x", "y", "theta")
 MAX_STREAM_BYTES = 64 * 2**20
 #: What `ros2 topic echo` prints in place of the poses that it leaves out.
 LEFT_OUT = "..."
+#: What is said of a file of poses without any.
+NO_POSES = "holds a path without poses, as that of a planner that found none; there is nothing to judge"
 #: Minimum norm of a quaternion that is a rotation, and of the part of its x axis that lies in the plane.
 LEAST_NORM, LEAST_IN_PLANE = 1e-3, math.sin(math.radians(1))
 
@@ -79,6 +82,8 @@ def _csv_poses(text: str) -> list[list[float]]:
     rows = [(number, [word.strip() for word in line.split(",")]) for number, line in lines]
     if not rows or tuple(rows[0][1][:3]) != CSV_HEADER:
         return []
+    if not rows[1:]:
+        raise _NoPose(NO_POSES)
     return [_csv_pose(number, row[:3]) for number, row in rows[1:]]
 
 
@@ -91,15 +96,22 @@ def _csv_pose(number: int, row: list[str]) -> list[float]:
 
 
 def _echoed_poses(text: str) -> list[list[float]]:
+    first, *others = re.split(r"^---[ \t]*\n", text.removeprefix("---\n") + "\n", flags=re.MULTILINE)
     try:
-        document = load_plain(text.removeprefix("---\n").split("\n---")[0], aliases=False, unique_keys=True)
+        document = load_plain(first, aliases=False, unique_keys=True)
         poses = document["poses"]
         listed = isinstance(poses, list)
     except RepeatedKeyOfYaml as error:
         raise _NoPose(f"{error}; give it once") from None
     except (yaml.YAMLError, RecursionError, OverflowError, ValueError, TypeError, LookupError):
         return []
-    return [_planar(number, pose) for number, pose in enumerate(poses)] if listed else []
+    if not listed:
+        return []
+    if more := sum(bool(other.strip()) for other in others):
+        raise _NoPose(f"holds {more + 1} messages; give one, as `ros2 topic echo --once` writes it")
+    if not poses:
+        raise _NoPose(NO_POSES)
+    return [_planar(number, pose) for number, pose in enumerate(poses)]
 
 
 def _planar(number: int, stamped: Any) -> list[float]:

@@ -77,12 +77,13 @@ def document_findings(document: Mapping[str, Any], path: "Path", found: Audit, m
 def unjudged_fields(document: Mapping[str, Any], passed_over: Sequence[str] = ()) -> list[str]:
     """Return the fields of a plan's document that are not judged.
 
-    Of the lower bounds it is judged that the path is not below them, but not that no other one is.
+    Of the lower bounds it is judged that the path is not below them, but not that no other one is; and of the settings those
+    that the cost and the poses depend on.
     """
     judged = {*_SAID_OF_A_PATH, *_BASIS, *_SETTINGS, "map_id", "length", "path_length", "max_curvature", "min_clearance", "gap",
               "cost", "cost_gap", "roomy_share", "poses", "waypoints", "waypoint_indices"}
-    others = [name for name in document if name not in judged or name in passed_over]
-    said = {"lower_bound": "lower_bound (that no path is shorter)",
+    others = [name for name in document if name not in judged or name in passed_over or name == "settings"]
+    said = {"settings": "settings (by which it was sought)", "lower_bound": "lower_bound (that no path is shorter)",
             "cost_lower_bound": "cost_lower_bound (that no path costs less)"}
     return [said.get(name, name) for name in others]
 

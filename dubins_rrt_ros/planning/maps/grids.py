@@ -136,9 +136,16 @@ def _parse_yaml(text: str) -> dict[str, Any]:
     return document
 
 
+def _instead_of(name: str, fields: dict[str, Any]) -> str:
+    """Return which of the fields that are there was likely meant, in words; "" where none is alike."""
+    others = {str(other).lower(): other for other in fields if other not in FIELDS}
+    near = difflib.get_close_matches(name, others, 1, LEAST_ALIKE)
+    return f" (there is {quoted(str(others[near[0]]))})" if near else ""
+
+
 def _field(fields: dict[str, Any], name: str, convert: Callable[[Any], Any], remedy: str) -> Any:
     if name not in fields:
-        raise MapMetadataError(f"{name} is missing; {remedy}")
+        raise MapMetadataError(f"{name} is missing{_instead_of(name, fields)}; {remedy}")
     try:
         return convert(fields[name])
     except (ValueError, TypeError, LookupError, AttributeError):
