@@ -131,6 +131,15 @@ class Dispatcher:
             worker.cancel_all()
         return list(self._under_way.values())
 
+    async def end_all(self) -> None:
+        """Cancel all that the workers have to do, and wait until it has ended."""
+        self.cancel_all()
+        ended = [Future() for _ in self._workers]
+        for worker, future in zip(self._workers, ended, strict=True):
+            worker.submit(lambda cancelled: None, partial(self._post, future.set_result))
+        for future in ended:
+            await future
+
     def close(self) -> None:
         """Cancel all requests and end the workers."""
         for worker in self._workers:

@@ -3,9 +3,11 @@
 import queue
 import threading
 from collections.abc import Callable
+from functools import partial
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.task import Future
 from rclpy.timer import Timer
 
 
@@ -24,6 +26,13 @@ class ExecutorQueue:
             if not self._closed:
                 self._calls.put(call)
                 self._posted.trigger()
+
+    async def rounds(self, number: int) -> None:
+        """Wait for so many rounds of the executor, in each of which all coroutines go on that can."""
+        for _ in range(number):
+            passed = Future()
+            self.post(partial(passed.set_result, None))
+            await passed
 
     def close(self) -> None:
         """Take no more calls."""

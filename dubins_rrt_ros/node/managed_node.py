@@ -1,14 +1,19 @@
 """A node that a lifecycle manager, such as Nav2's, may bring up and take down."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
 
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 
 from dubins_rrt_ros.planning.errors import PlanningError
+from dubins_rrt_ros.planning.text import quoted_name
+
+#: Transitions that end no requests.
+BEGINNING = ("configure", "activate")
 
 
 class ManagedNode(LifecycleNodeMixin, Node, ABC):
@@ -35,27 +40,38 @@ class ManagedNode(LifecycleNodeMixin, Node, ABC):
         """End what the parts do, as many as there are."""
 
     @abstractmethod
-    def cancel_requests(self) -> None:
-        """End all requests."""
+    def end_requests(self) -> Awaitable[None]:
+        """End all requests, each of which is answered when this has been awaited."""
 
     def begin(self, managed: bool) -> None:
         """Set up and be active, or wait for a lifecycle manager."""
         if managed:
-            LifecycleNodeMixin.__init__(self)
-            self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
+            # In the default group the transition that awaits would keep everything else waiting.
+            LifecycleNodeMixin.__init__(self, callback_group=MutuallyExclusiveCallbackGroup())
+            change: Any = partial(self._change_state, self._service_change_state.callback)  # which executors await
+            self._service_change_state.callback = change
             self.get_logger().info("Unconfigured: waiting for a lifecycle manager")
         else:
             self.set_up()
             self.is_active = True
 
-    def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-        """Answer a request for a transition; rclpy's own callback, `change`, has no answer where the state does not have it."""
+    async def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer a request for a transition; rclpy's own callback, `change`, has no answer where the state does not have it.
+
+        Requests under way are ended, and answered, before it.
+        """
         wanted = request.transition
-        if wanted.label or wanted.id in {number for number, *_ in self._state_machine.available_transitions}:
-            return change(request, response)
-        self.get_logger().warning(f"The state '{self._state_machine.current_state[1]}' has no transition {wanted.id}")
-        response.success = False
-        return response
+        available = {number: label for number, label, *_ in self._state_machine.available_transitions}
+        label = wanted.label or available.get(wanted.id)
+        if label not in available.values():
+            self.get_logger().warning(f"The state '{self._state_machine.current_state[1]}' has no transition "
+                                      f"{quoted_name(wanted.label) if wanted.label else wanted.id}")
+            response.success = False
+            return response
+        if label not in BEGINNING:
+            self.is_active = False
+            await self.end_requests()
+        return change(request, response)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Set up."""
@@ -74,9 +90,8 @@ class ManagedNode(LifecycleNodeMixin, Node, ABC):
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Take no requests, and end those under way."""
+        """Take no requests from now on."""
         self.is_active = False
-        self.cancel_requests()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:

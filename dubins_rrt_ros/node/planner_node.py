@@ -32,6 +32,9 @@ Part = TypeVar("Part", ExecutorQueue, Frames, Maps, PathCheck, Dispatcher, Nav2)
 
 #: Time between two log lines on what is missing [s].
 REMINDER_INTERVAL = 5.0
+#: Rounds of the executor after which whoever waited for the outcome of a request has answered: an action's goal goes on, ends,
+#: and has its result sent, each in a round of its own.
+ANSWERING_ROUNDS = 6
 
 
 class PlannerNode(ManagedNode):
@@ -116,10 +119,12 @@ class PlannerNode(ManagedNode):
             part.close()
         self._parts.clear()
 
-    def cancel_requests(self) -> None:
-        """End all requests, as the service does."""
-        self._session.cancel()
-        self._dispatcher.cancel_all()
+    async def end_requests(self) -> None:
+        """End all requests, as the service does, and let them be answered."""
+        if self._parts:
+            self._session.cancel()
+            await self._dispatcher.end_all()
+            await self._queue.rounds(ANSWERING_ROUNDS)
 
     def report_defect(self, error: Exception) -> None:
         """Report an exception that belongs to no request."""

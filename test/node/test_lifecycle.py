@@ -10,7 +10,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from support.harness import poses_of
-from support.yard import GOAL, QUICK, START, yard
+from support.yard import ENDLESS, GOAL, ON_THE_WAY_OUT, QUICK, START, yard
 
 from dubins_rrt_ros.planning import GridMap, save_map
 
@@ -19,6 +19,7 @@ UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = (State.PRIMARY_STATE_UNCONFIGURED, S
 CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP, SHUTDOWN = (
     Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE,
     Transition.TRANSITION_CLEANUP, Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
+SHUTDOWN_WHILE_ACTIVE = Transition.TRANSITION_ACTIVE_SHUTDOWN
 
 
 class Manager:
@@ -37,7 +38,11 @@ class Manager:
 
     def change(self, transition: int) -> bool:
         """Ask for a transition; whether it succeeded."""
-        return self._client.response(self.request(transition)).success
+        return self.succeeded(self.request(transition))
+
+    def succeeded(self, requested) -> bool:
+        """Wait for a transition that was asked for; whether it succeeded."""
+        return self._client.response(requested).success
 
     def request(self, transition: int):
         """Ask for a transition without waiting for it."""
@@ -107,6 +112,25 @@ def test_goals_of_actions_are_rejected_while_it_is_inactive(planners, map_file):
     assert not action.handle(goal).accepted
     assert manager.change(ACTIVATE)
     assert action.path(GOAL, START)[0] == SUCCEEDED
+
+
+@pytest.mark.messages
+@pytest.mark.skipif(importlib.util.find_spec("nav2_msgs") is None, reason="nav2_msgs is not here; .ci/messages builds it")
+@pytest.mark.parametrize("transitions", [(DEACTIVATE, CLEANUP), (SHUTDOWN_WHILE_ACTIVE,)])
+def test_requests_under_way_are_answered_before_it_is_taken_down(planners, map_file, transitions):
+    from nav2_msgs.action import ComputePathToPose
+    from support.nav2_client import PathClient
+
+    manager = Manager(planners, map_file=map_file, **ENDLESS)
+    assert manager.change(CONFIGURE) and manager.change(ACTIVATE)
+    client = planners.client()
+    action = PathClient(client, ComputePathToPose, "compute_path_to_pose")
+    result = action.send(ON_THE_WAY_OUT, START).get_result_async()
+    future, _ = client.begin_plan(START, ON_THE_WAY_OUT)
+    at_once = [manager.request(transition) for transition in transitions]
+    assert all(map(manager.succeeded, at_once))
+    assert client.response(future).plan.poses == []
+    assert "CANCELLED" in action.answer(result).result.error_msg
 
 
 @pytest.mark.slow
