@@ -215,7 +215,7 @@ class _Bound:
         room = self._room(boxes[closed, :2]) + boxes[closed, 4]
         _demand(room < self._inner, "a box that may be free has no potential", self._world, boxes[closed])
         steps = ways(crossings, start, goals)
-        for number in np.flatnonzero(steps.any(axis=0)[portal]):
+        for number in np.flatnonzero(np.asarray(steps.any(axis=0))[portal]):
             _demand(_covers(table[gate == number]), "boxes do not cover a level", self._world, gates[[number]])
         on_portals = [boxes[~closed & (portal[gate] == number)] for number in range(len(crossings))]
         self._check_steps(steps, [*on_portals, self._start_box, *[self._goal_boxes] * len(goals)], enough)

@@ -53,7 +53,7 @@ def test_a_radius_that_is_the_derived_one_or_was_not_given_is_not_warned_of():
         assert Vehicle(robot_radius=0.9, footprint=()).robot_radius == 0.9
         assert replace(Vehicle(), footprint=SQUARE).robot_radius == 0.5
         leaving = plan(Problem(GridMap(WALL, 0.1, (0.0, 0.0, 0.0)), Vehicle(0.5, footprint=SQUARE),
-                               (0.69, 2.0, 0.0), (3.5, 2.0, 0.0), start_slack=0.1), Settings(planner="rrt"))
+                               (0.69, 2.0, 0.0), (3.5, 2.0, 0.0), start_slack=0.1), Settings(planner="rrt", planning_time=60.0))
         assert leaving.solved and leaving.start_too_near
 
 

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from support.cases import needs_compiled
 
 from dubins_rrt_ros.evaluation.waypoints import VEHICLE, random_poses
 from dubins_rrt_ros.planning import GridMap, prepare
@@ -35,12 +36,14 @@ def floor(with_closets):
     return prepare(GridMap(cells, 0.05, (0.0, 0.0, 0.0), percent=True), VEHICLE)
 
 
+@needs_compiled
 @pytest.mark.parametrize("seed", [11, 12, 18])  # whose first place is in a closet
 def test_a_pose_that_leads_nowhere_is_drawn_anew(seed):
     poses = random_poses(floor(with_closets=True), Limited(seed))
     assert len(poses) == 4 and min(x for x, _, _ in poses) > 5.0
 
 
+@needs_compiled
 def test_problems_do_not_depend_on_how_busy_the_machine_is(monkeypatch):
     """With a clock that goes on by 10 ms with each look at it a path takes a second."""
     world, looks = floor(with_closets=False), itertools.count()

@@ -166,7 +166,7 @@ class _Draft:
         (gates, *parts), ends = self._squares.gates(), self._ends()
         keys = list(zip(*(self._cells[*some.T].tolist() for some in parts), strict=True))
         portals = sorted(set(keys))
-        used = compress(portals, ways(np.array(portals), ends.start_cell, ends.goal_cells).any(axis=0))
+        used = compress(portals, np.asarray(ways(np.array(portals), ends.start_cell, ends.goal_cells).any(axis=0)))
         return Cover(gates, keys, list(used), ends, self._is_blocked, self._margin)
 
     def _ends(self) -> Ends:
