@@ -23,7 +23,7 @@ from dubins_rrt_ros.planning.world import problem_with_costs
 
 from .common.documents import read_poses_or_json
 from .common.example import ENDS, MAP
-from .common.flags import add_option_flags, given_options, given_vehicle
+from .common.flags import add_option_flags, checked_options
 from .common.output import check_folder, finite, words_for, write_document
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.request import add_map_arguments, map_options, read_map
@@ -124,7 +124,7 @@ def _judge_plan(document: Mapping[str, Any], world_map: Map, arguments: argparse
     path = read_path(document)
     if path is None:
         raise PlanFileError(f"it holds no path but {quoted(document.get('error_name'))}; there is nothing to judge")
-    given, of_request = given_vehicle(arguments), given_options(arguments, Problem)
+    given, of_request = (checked_options(arguments, cls) for cls in (Vehicle, Problem))
     replaced = {name: value for flag in given for name, value in _OVERRIDES.get(flag, {}).items()}
     vehicle = Vehicle(**without_overridden(values(problem.vehicle) | replaced | given))
     problem = replace(problem, vehicle=vehicle, **_ends(arguments), **of_request)
@@ -148,7 +148,8 @@ def _costs(path: Path, problem: Problem, settings: Settings) -> CostFigures:
 def _judge_poses(document: Any, world_map: Map, arguments: argparse.Namespace) -> Verdict:
     poses = _poses(document)
     ends = {"start": poses[0], "goal": poses[-1]} | _ends(arguments)
-    problem = Problem(world_map, Vehicle(**given_vehicle(arguments)), **ends, **given_options(arguments, Problem))
+    vehicle, request = Vehicle(**without_overridden(checked_options(arguments, Vehicle))), checked_options(arguments, Problem)
+    problem = Problem(world_map, vehicle, **ends, **request)
     others = tuple(name for name in document if name != "poses") if isinstance(document, Mapping) else ()
     found = audit_poses(poses, problem, arguments.tolerance_xy, arguments.tolerance_yaw)
     return Verdict(problem, driven_length(poses), found, others)

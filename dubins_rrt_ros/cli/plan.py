@@ -16,10 +16,11 @@ from dubins_rrt_ros.planning import GridMap, Plan, Problem, Progress, Settings, 
 from dubins_rrt_ros.planning.maps.frame import DoubtfulYaw, doubt_about_yaw
 from dubins_rrt_ros.planning.plan_file import repeating
 from dubins_rrt_ros.planning.problem import Waypoint, checked_waypoint
+from dubins_rrt_ros.planning.vehicle import without_overridden
 
 from .common.certificates import UNCERTIFIED, add_certificate_flags, certifiable_map, proof_limits, write_proof
 from .common.example import ENDS, EXAMPLE, MAP
-from .common.flags import LengthSettings, add_option_flags, add_paper_flag, flag, given_options, given_settings, given_vehicle
+from .common.flags import LengthSettings, add_option_flags, add_paper_flag, checked_options, flag, given_settings
 from .common.output import ANIMATIONS, DRAWINGS, check_drawing, check_folder, is_animation, words_for, write_csv, write_json
 from .common.parser import Parser, UsageError, add_json_flag, describe
 from .common.progress import progress_bar
@@ -136,10 +137,10 @@ def _request(arguments: argparse.Namespace) -> LoadedRequest:
 def new_request(arguments: argparse.Namespace) -> LoadedRequest:
     """Read the request that the flags of `add_request_arguments` describe."""
     warnings.simplefilter("ignore", DoubtfulYaw)  # which `_pose` says, with the flag
-    vehicle, settings = Vehicle(**given_vehicle(arguments)), Settings(**given_settings(arguments))
+    vehicle, settings = Vehicle(**without_overridden(checked_options(arguments, Vehicle))), Settings(**given_settings(arguments))
     world_map, load_time = read_map(arguments.map, **map_options(arguments))
     start, goal = (_pose(arguments, name, getattr(arguments, name)) for name in ("start", "goal"))
-    problem = Problem(world_map, vehicle, start, goal, **given_options(arguments, Problem))
+    problem = Problem(world_map, vehicle, start, goal, **checked_options(arguments, Problem))
     return LoadedRequest(arguments.map, problem, settings, load_time, waypoints=_waypoints(arguments))
 
 

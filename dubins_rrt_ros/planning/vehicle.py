@@ -33,7 +33,7 @@ class DoubtfulVehicle(UserWarning):
 
 
 #: Options that take the place of others.
-OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius"}
+OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius", "any_goal_heading": "goal_tolerance_yaw"}
 
 
 def overridden(given: Mapping[str, Any]) -> dict[str, str]:
@@ -48,7 +48,7 @@ def without_overridden(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_set(value: Any) -> bool:
-    """Return False for a wheelbase of 0, and for the text of a footprint without corners."""
+    """Return False for a wheelbase of 0, for false, and for the text of a footprint without corners."""
     return bool(value.strip(" \t\r\n[]") if isinstance(value, str) else value)
 
 

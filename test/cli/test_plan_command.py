@@ -119,6 +119,9 @@ def test_a_flag_that_another_one_overrides_is_told_and_the_turning_radius_that_r
     assert status == 0 and error.splitlines() == [
         "dubins_rrt plan: warning: --robot-radius has no effect, as --footprint takes its place",
         "dubins_rrt plan: warning: --turning-radius has no effect, as --wheelbase takes its place"]
+    status, out, error = run(hall, *REQUEST, *BUDGET, "--any-goal-heading", "--goal-tolerance-yaw", "0.2", capsys=capsys)
+    assert status == 0 and error == (
+        "dubins_rrt plan: warning: --goal-tolerance-yaw has no effect, as --any-goal-heading takes its place\n")
 
 
 def test_unknown_space_that_counts_as_free_is_warned_about(hall, capsys):

@@ -277,6 +277,10 @@ def test_a_value_in_whose_place_another_one_is_used_is_told_when_it_is_set(talk)
         assert talk.client.set_parameters(robot_radius=0.2, turning_radius=1.5).successful  # the first stays as it was
         assert talk.client.set_parameters(robot_radius=0.25).successful
         talk.client.wait_for_word("robot_radius has no effect, as footprint takes its place")
+        assert talk.client.set_parameters(any_goal_heading=True).successful
+        assert talk.client.set_parameters(goal_tolerance_yaw=0.1).successful
+        talk.client.wait_for_word("goal_tolerance_yaw has no effect, as any_goal_heading takes its place")
     finally:
-        assert talk.client.set_parameters(footprint="", robot_radius=0.2, turning_radius=1.0).successful
-    assert talk.process.output[said:].count("has no effect") == 1
+        assert talk.client.set_parameters(footprint="", robot_radius=0.2, turning_radius=1.0, any_goal_heading=False,
+                                          goal_tolerance_yaw=0.0).successful
+    assert talk.process.output[said:].count("has no effect") == 2

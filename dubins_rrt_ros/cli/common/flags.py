@@ -9,7 +9,7 @@ from typing import Any
 from dubins_rrt_ros.planning import Settings, options
 from dubins_rrt_ros.planning.option import Option
 from dubins_rrt_ros.planning.settings import PAPER, SHORTEST, preferred_clearance_option
-from dubins_rrt_ros.planning.vehicle import Vehicle, overridden, without_overridden
+from dubins_rrt_ros.planning.vehicle import overridden
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ def given_options(arguments: argparse.Namespace, cls: type) -> dict[str, Any]:
     return {item.name: getattr(arguments, item.name) for item in options(cls) if item.name in arguments}
 
 
-def given_vehicle(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `Vehicle` that were given on the command line but those that have no effect, which it warns of."""
-    given = given_options(arguments, Vehicle)
+def checked_options(arguments: argparse.Namespace, cls: type) -> dict[str, Any]:
+    """Return the options of `cls` that were given on the command line; warn of those in whose place another one is used."""
+    given = given_options(arguments, cls)
     for name, by in overridden(given).items():
         print(f"dubins_rrt {arguments.command}: warning: {flag(name)} has no effect, as {flag(by)} takes its place",
               file=sys.stderr)
-    return without_overridden(given)
+    return given
 
 
 def flag(name: str) -> str:
