@@ -38,7 +38,10 @@ def check_hull(found, polygon):
 
 
 def check_parts(found, polygon):
-    """Together the convex parts are the polygon; made wider they hold it made wider, and reach at most sqrt(2) as far."""
+    """Together the convex parts are the polygon; made wider they hold it made wider, and reach at most sqrt(2) as far.
+
+    Each is in its disc, which is made wider by more than that.
+    """
     corners = np.array(polygon.exterior.coords)
     rim = (corners[:-1, None] + np.linspace(0, 1, 12)[:, None] * np.diff(corners, axis=0)[:, None]).reshape(-1, 1, 2)
     bearing = np.linspace(0, math.tau, 73)
@@ -50,7 +53,8 @@ def check_parts(found, polygon):
         assert shapely.distance(parts, shapely.points(within)).max() <= tolerance
         assert shapely.distance(polygon, shapely.points(shapely.get_coordinates(parts))).max() <= math.sqrt(2) * wider + tolerance
         assert polygon.difference(parts.buffer(1e-9)).area < 1e-9
-        for ring in rings:
+        for (x, y, radius), ring in zip(found.part_discs, rings, strict=True):
+            assert np.hypot(*(ring - (x, y)).T).max() <= radius + (math.sqrt(2) + 1e-6) * wider + 1e-9
             assert shapely.Polygon(ring).area == pytest.approx(shapely.convex_hull(shapely.MultiPoint(ring)).area, rel=1e-9)
             assert shapely.LinearRing(ring).is_ccw
 

@@ -38,6 +38,8 @@ else:
 
 #: Gap of a vehicle that touches an obstacle.
 CONTACT = cython.declare(cython.double, -UNLIMITED)
+#: How far a polygon reaches beyond itself per metre of widening, rounded up.
+FARTHEST = cython.declare(cython.double, 1.4143)
 #: Factor by which a widened polygon is narrowed until it is clear.
 NARROWER = cython.declare(cython.double, 0.25)
 
@@ -91,7 +93,7 @@ class CollisionChecker:
 class PolygonChecker(CollisionChecker):
     """The checker of a polygon, as `collision/footprint.py` prepares it. It has working memory: no two threads may share one."""
 
-    def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, hull, worth):
+    def __init__(self, clearance: Clearance, required_clearance, discs, corners, first_corner, part_discs, hull, worth):
         """Make the checker of a polygon.
 
         Args:
@@ -100,14 +102,16 @@ class PolygonChecker(CollisionChecker):
             corners: (n, 4): the corners of its convex parts, counter-clockwise: x, y, and their displacement per metre of
                 widening.
             first_corner: (p + 1,) int32: the index of each part's first corner, and n.
-            hull: (h, 4): the same of the convex hull, or none where that is not to be checked first.
+            part_discs: (p, 3): a disc around each part: x, y, radius.
+            hull: (h, 4): as `corners`, those of the convex hull, or none where that is not to be checked first.
             worth: gap from which on the bound by the discs is good enough [m].
         """
         CollisionChecker.__init__(self, clearance, required_clearance)
         self.discs, self.corners, self.first_corner, self.worth = discs, corners, first_corner, worth
-        self.hull, self.outline = hull, hull if len(hull) else corners
+        self.part_discs, self.hull, self.outline = part_discs, hull, hull if len(hull) else corners
         self.placed = np.empty((max(len(hull), len(corners)), 2))
         self.spans = np.empty((clearance.field.shape[0], 2))
+        self.touching = 0  # the part that touched an obstacle last, which is looked at first
 
     def pose_is_free(self, pose):
         """Return whether the vehicle keeps the margin at a pose."""
@@ -193,24 +197,43 @@ class PolygonChecker(CollisionChecker):
         sin_theta: cython.double = sin(pose.theta) * cos_yaw - cos(pose.theta) * sin_yaw
         forth_x: cython.double = ahead * cos_theta
         forth_y: cython.double = ahead * sin_theta
+        parts: cython.int = cython.cast(cython.int, self.part_discs.shape[0])
+        i: cython.int
         part: cython.int
+        first: cython.int
+        end: cython.int
         if self.hull.shape[0] > 0:
-            self.place(self.hull, column, row, cos_theta, sin_theta, wider)
-            if self.clearance.sweep_is_clear(self.placed, 0, self.hull.shape[0], forth_x, forth_y, self.spans):
+            end = cython.cast(cython.int, self.hull.shape[0])
+            self.place(self.hull, 0, end, column, row, cos_theta, sin_theta, wider)
+            if self.clearance.sweep_is_clear(self.placed, 0, end, forth_x, forth_y, self.spans):
                 return True
-        self.place(self.corners, column, row, cos_theta, sin_theta, wider)
-        for part in range(cython.cast(cython.int, self.first_corner.shape[0]) - 1):
-            if not self.clearance.sweep_is_clear(self.placed, self.first_corner[part], self.first_corner[part + 1],
-                                                 forth_x, forth_y, self.spans):
+        for i in range(parts):
+            part = (self.touching + i) % parts
+            if ahead == 0 and self.part_is_far(part, column, row, cos_theta, sin_theta, wider):
+                continue
+            first, end = self.first_corner[part], self.first_corner[part + 1]
+            self.place(self.corners, first, end, column, row, cos_theta, sin_theta, wider)
+            if not self.clearance.sweep_is_clear(self.placed, first, end, forth_x, forth_y, self.spans):
+                self.touching = part
                 return False
         return True
 
-    def place(self, corners, column, row, cos_theta, sin_theta, wider):
+    def part_is_far(self, part, column, row, cos_theta, sin_theta, wider):
+        """Return whether the raster alone shows that a part, widened, touches no obstacle."""
+        x: cython.double = column + cos_theta * self.part_discs[part, 0] - sin_theta * self.part_discs[part, 1]
+        y: cython.double = row + sin_theta * self.part_discs[part, 0] + cos_theta * self.part_discs[part, 1]
+        if not (0 <= x <= self.clearance.width and 0 <= y <= self.clearance.height):
+            return False
+        bound: cython.double = cython.cast(cython.double, self.clearance.field[self.clearance.row_of(y),
+                                                                               self.clearance.column_of(x)])
+        return bound >= self.part_discs[part, 2] + FARTHEST * wider + self.clearance.margin
+
+    def place(self, corners, first, end, column, row, cos_theta, sin_theta, wider):
         """Write corners, displaced as those of what is widened, to `placed`, in the raster's frame."""
         along: cython.double
         across: cython.double
-        i: cython.Py_ssize_t
-        for i in range(corners.shape[0]):
+        i: cython.int
+        for i in range(first, end):
             along = corners[i, 0] + wider * corners[i, 2]
             across = corners[i, 1] + wider * corners[i, 3]
             self.placed[i, 0] = column + cos_theta * along - sin_theta * across

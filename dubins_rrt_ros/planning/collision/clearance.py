@@ -145,8 +145,8 @@ class ClearanceField:
             return CollisionChecker(clearance=self.kernel, required_clearance=vehicle.robot_radius)
         found = cover(vehicle.footprint)
         return PolygonChecker(clearance=self.kernel, required_clearance=vehicle.required_clearance, discs=found.discs,
-                              corners=found.corners, first_corner=found.first_corner, hull=found.hull,
-                              worth=max(found.excess, 2 * CLEARANCE_MARGIN))
+                              corners=found.corners, first_corner=found.first_corner, part_discs=found.part_discs,
+                              hull=found.hull, worth=max(found.excess, 2 * CLEARANCE_MARGIN))
 
     def room(self, vehicle: Vehicle) -> Room:
         """Return the room of a vehicle, the distance from its outline to the nearest obstacle, for one thread."""

@@ -29,6 +29,7 @@ class Cover:
         corners: (n, 4) float64: x and y of the corners of its convex parts [m], counter-clockwise, and their displacement
             per metre by which the part is widened, at most sqrt(2).
         first_corner: (p + 1,) int32: index of the first corner of each part, and the number of corners.
+        part_discs: (p, 3) float64: x, y and radius of a disc around each part [m].
         hull: (h, 4) float64: as `corners`, those of the convex hull; none where there are too few parts for it to be worthwhile.
     """
 
@@ -36,6 +37,7 @@ class Cover:
     excess: float
     corners: np.ndarray
     first_corner: np.ndarray
+    part_discs: np.ndarray
     hull: np.ndarray
 
 
@@ -45,10 +47,11 @@ def cover(footprint: Footprint) -> Cover:
     polygon = shapely.Polygon(footprint)
     discs = np.array([_disc_around(piece, polygon) for piece in _pieces(polygon)])
     excess = float(shapely.distance(polygon, shapely.points(_rims(discs))).max())
-    parts = [_widened(part) for part in _convex_parts(footprint)]
+    convex_parts = _convex_parts(footprint)
+    parts, part_discs = [_widened(part) for part in convex_parts], np.array([_disc_of(part) for part in convex_parts])
     first_corner = np.cumsum([0, *map(len, parts)]).astype(np.int32)
     hull = _widened(_hull(polygon)) if len(parts) >= PARTS_WORTH_HULL else np.empty((0, 4))
-    return Cover(discs, excess, np.concatenate(parts), first_corner, hull)
+    return Cover(discs, excess, np.concatenate(parts), first_corner, part_discs, hull)
 
 
 def summary(footprint: Footprint) -> str:
@@ -80,6 +83,12 @@ def _disc_around(piece: shapely.Geometry, polygon: shapely.Polygon) -> tuple[flo
     radius = max(math.dist((centre.x, centre.y), corner) for corner in shapely.get_coordinates(piece).tolist())
     inner = shapely.distance(polygon.exterior, centre) if polygon.contains(centre) else 0.0
     return centre.x, centre.y, radius * (1 + 1e-9), inner * (1 - 1e-9)
+
+
+def _disc_of(corners: np.ndarray) -> tuple[float, float, float]:
+    """Return the centre and the radius of a disc around (k, 2) corners."""
+    x, y = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    return x, y, float(np.hypot(*(corners - (x, y)).T).max()) * (1 + 1e-9)
 
 
 def _convex_parts(footprint: Footprint) -> list[np.ndarray]:
