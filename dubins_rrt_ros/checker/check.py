@@ -188,7 +188,7 @@ class _Bound:
         _demand(named.shape == (parts.sum(),) and named.min(initial=0) >= 0, "the cells do not fit the corridor")
         cells = self._cells = np.full(parts.shape, -1)  # where there is none
         cells[parts] = named
-        meeting = sliding_window_view(np.pad(cells, ((0, 0), (0, 1), (0, 1)), constant_values=-1), (2, 2), axis=(1, 2))
+        meeting = sliding_window_view(np.pad(cells, 1, constant_values=-1), (2, 2), axis=(1, 2))
         is_one = (meeting == meeting.max(axis=(3, 4), keepdims=True)) | (meeting < 0)
         _demand(is_one.all(), "two cells meet within a slab")
 
