@@ -10,6 +10,7 @@ from support.cases import needs_compiled, path_over
 from dubins_rrt_ros.evaluation.families.problems import constructed
 from dubins_rrt_ros.planning import ClearanceField, DubinsCurve, Path, PolygonMap, Problem, Settings, Vehicle, audit_path, plan
 from dubins_rrt_ros.planning._kernels.arc_fit import ArcFit
+from dubins_rrt_ros.planning._kernels.cholesky import solve_definite
 from dubins_rrt_ros.planning.collision.raster import CLEARANCE_MARGIN
 from dubins_rrt_ros.planning.curves.dubins import SIDES, WORDS
 from dubins_rrt_ros.planning.plan_file import read_request, to_document
@@ -192,10 +193,7 @@ def test_what_is_not_repaired_is_judged_by_the_checker_itself(middle, tunnel, ra
 
 
 def test_where_no_step_is_to_be_had_there_is_no_path(middle, tunnel, monkeypatch):
-    def singular(*_):
-        raise np.linalg.LinAlgError
-
-    monkeypatch.setattr(np.linalg, "solve", singular)
+    monkeypatch.setattr(repair_module, "solve_definite", lambda *_: False)
     assert repair(spoilt(middle, 1), tunnel) is None
 
 
@@ -217,3 +215,18 @@ def test_a_tube_that_leaves_millimetres_is_soon_driven_through(number):
     assert answer.length < 1.01 * case.length
     again = plan(*read_request(to_document(answer, "tube"), case.problem.map))
     assert again.path == answer.path and math.isclose(again.length, answer.length)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 40])
+def test_a_definite_system_is_solved(size):
+    rng = np.random.default_rng(size)
+    factors, solution = rng.normal(size=(size, size + 1)), rng.normal(size=size)
+    matrix = factors @ factors.T + 1e-3 * np.eye(size)
+    values, lower = matrix @ solution, np.where(np.tri(size) > 0, matrix, math.nan)  # the rest does not count
+    assert solve_definite(lower, values)
+    assert values == pytest.approx(solution, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 2.0], [2.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]], [[math.nan]], [[-1.0]]])
+def test_a_system_that_is_not_definite_is_not_solved(matrix):
+    assert not solve_definite(np.array(matrix), np.ones(len(matrix)))

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .._kernels.arc_fit import ArcFit
+from .._kernels.cholesky import solve_definite
 from .._kernels.clearance import Clearance
 from ..curves.dubins import SIDES, WORDS
 from ..curves.path import Path
@@ -161,10 +162,10 @@ class _Fit:
         is_free = (self._lengths > 0) | (gradient <= 0)
         step = np.zeros(len(self._lengths))
         for _ in range(MOST_SOLUTIONS):
-            fixed = gradient[is_free] + system[np.ix_(is_free, ~is_free)] @ step[~is_free]
-            try:
-                step[is_free] = -np.linalg.solve(system[np.ix_(is_free, is_free)], fixed)
-            except np.linalg.LinAlgError:  # singular in spite of the damping
+            values = -gradient[is_free] - (system[np.ix_(is_free, ~is_free)] * step[~is_free]).sum(axis=1)
+            if solve_definite(system[np.ix_(is_free, is_free)], values):
+                step[is_free] = values
+            else:  # singular in spite of the damping
                 step[:] = math.nan
             is_negative = is_free & (self._lengths + step < 0)
             if not is_negative.any():
