@@ -8,7 +8,6 @@ from threading import Event
 
 import numpy as np
 import pytest
-from support.buildings import office
 from support.cases import needs_compiled, scaled
 from support.yard import GOAL, IN_THE_BOX, IN_THE_CHAMBER, START, yard
 
@@ -23,7 +22,6 @@ from dubins_rrt_ros.planning import (
     plan,
     plan_through,
     prepare,
-    rasterise,
     waypoint_headings,
     waypoints,
 )
@@ -32,7 +30,6 @@ from dubins_rrt_ros.planning.audit.verdict import passing_findings
 from dubins_rrt_ros.planning.curves import dubins
 from dubins_rrt_ros.planning.deadline import OutOfTime
 from dubins_rrt_ros.planning.maps.locate import maps_directory
-from dubins_rrt_ros.planning.search.legs import cheapest_chain, first_impassable
 from dubins_rrt_ros.planning.stops import least_length, legs_along, stops_of
 
 DISC = Vehicle(turning_radius=1.0, robot_radius=0.2)
@@ -354,21 +351,6 @@ def test_the_audit_finds_a_waypoint_that_is_not_passed(over_both):
         assert "does not pass waypoint" in next(passing_findings(path, wrong))
 
 
-@pytest.mark.slow
-@needs_compiled
-def test_a_leg_is_not_given_up_where_the_cheapest_ways_onto_its_path_and_off_it_cross():
-    vehicle = Vehicle(1.0, 0.3)
-    world = prepare(rasterise(office(5, seed=3, door=1.6), 0.05), vehicle)
-    rng = np.random.default_rng(5)
-    draws = np.column_stack([rng.uniform(0.5, 24.5, (100, 2)), rng.uniform(-math.pi, math.pi, 100)]).tolist()
-    free = [pose for pose in map(tuple, draws) if world.field.pose_is_free(pose, vehicle)]
-    settings = Settings(planner="rrt", planning_time=2.0, seed=1)
-    for start, waypoint, goal in zip(free[:9:3], free[1::3], free[2::3], strict=False):
-        legs = [Problem(world, start=here, goal=there) for here, there in ((start, waypoint), (waypoint, goal))]
-        if all(plan(leg, settings).solved for leg in legs):
-            assert plan_through(Problem(world, start=start, goal=goal), [waypoint], settings).solved
-
-
 @pytest.mark.parametrize("given", [True, pytest.param(False, marks=needs_compiled)], ids=["headings given", "any heading"])
 def test_a_path_that_is_known_is_where_it_begins(world, known, given, request):
     rest = (known if given else request.getfixturevalue("over_both")[0].path).after(0.7)
@@ -396,17 +378,6 @@ def test_a_path_that_passes_other_places_is_no_seed(world, known):
     other = plan(problem, FIRST).path
     assert legs_along(other, list(stops_of(problem, WITH_HEADINGS))) is None
     assert plan_through(problem, WITH_HEADINGS, FIRST, seed_path=other).path == known
-
-
-def test_the_cheapest_chain_is_that_of_all_chains():
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        costs = [rng.uniform(1, 2, shape) for shape in ((1, 4), (4, 3), (3, 4))]
-        costs[1][rng.integers(4), :] = math.inf
-        i, j, k = min(np.ndindex(4, 3, 4), key=lambda chain: costs[0][0, chain[0]] + costs[1][chain[:2]] + costs[2][chain[1:]])
-        assert cheapest_chain(costs) == [0, i, j, k]
-        assert first_impassable(costs) is None
-        assert first_impassable([costs[0], np.full((4, 3), math.inf), costs[2]]) == 1
 
 
 @needs_compiled

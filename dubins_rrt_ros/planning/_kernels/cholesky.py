@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Solution of small symmetric systems by their Cholesky factors: in one thread, and the same to the last bit on each machine.
+"""Solution of small symmetric systems by their Cholesky factors: in one thread, and by the same operations on each machine.
 
 Libraries of linear algebra share such a system among threads, which wait for each other far longer than it takes where other
 processes want the processors too.
