@@ -18,6 +18,15 @@ from .text import quoted
 _Class = TypeVar("_Class", bound=type)
 
 
+class _Unset:
+    def __repr__(self) -> str:
+        return "unset"
+
+
+#: What a field holds until its class' `__post_init__` where nothing was given, and its default must not be taken for given.
+UNSET: Any = _Unset()
+
+
 class OptionError(PlanningError, ValueError):
     """A value that an option does not take; the message names option, value and remedy."""
 
@@ -109,10 +118,11 @@ class Option(NamedTuple):
 
 
 def option(default: Any, description: str, *, unit: str = "", low: float | None = None, high: float | None = None,
-           choices: tuple[str, ...] = (), text_form: TextForm | None = None) -> Any:
-    """Return a dataclass field that is an option."""
-    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": description, "text_form": text_form}
-    return dataclasses.field(default=default, metadata=metadata)
+           choices: tuple[str, ...] = (), text_form: TextForm | None = None, may_be_derived: bool = False) -> Any:
+    """Return a dataclass field that is an option; one that may be derived from others is UNSET where nothing is given."""
+    metadata = {"default": default, "unit": unit, "low": low, "high": high, "choices": choices, "help": description,
+                "text_form": text_form}
+    return dataclasses.field(default=UNSET if may_be_derived else default, metadata=metadata)
 
 
 def options(cls: type) -> tuple[Option, ...]:
@@ -121,16 +131,17 @@ def options(cls: type) -> tuple[Option, ...]:
 
 
 def _option_of(field: "dataclasses.Field[Any]") -> Option:
-    form = field.metadata["text_form"]
-    default = form.write(field.default) if form else field.default
+    form, default = field.metadata["text_form"], field.metadata["default"]
+    if form:
+        default = form.write(default)
     if isinstance(default, tuple):
         default = list(default)
-    return Option(name=field.name, type=type(default), default=default, **field.metadata)
+    return Option(name=field.name, type=type(default), **{**field.metadata, "default": default})
 
 
 def documented(cls: _Class) -> _Class:
     """Add the options of a dataclass, with default, unit and range, to its docstring."""
-    defaults = {field.name: field.default for field in dataclasses.fields(cls)}
+    defaults = {field.name: field.metadata["default"] for field in dataclasses.fields(cls) if field.metadata}
     lines = [f"{item.name} ({type(defaults[item.name]).__name__}, default {defaults[item.name]!r}): {item.describe()}"
              for item in options(cls)]
     entries = (textwrap.fill(line, 110, initial_indent=" " * 8, subsequent_indent=" " * 12) for line in lines)

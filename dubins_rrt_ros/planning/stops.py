@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, pairwise
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -12,8 +12,30 @@ from .curves.angles import SAME, heading_error, position_error, wrap
 from .curves.path import Path
 from .problem import Pose, Problem, Waypoint
 
-#: Number of headings that are tried at a waypoint.
+#: Number of headings that are tried at a waypoint, and these.
 HEADINGS = 72
+_HEADINGS: list[float] = wrap(np.arange(HEADINGS) * (math.tau / HEADINGS)).tolist()
+
+
+class AnyHeading(Sequence[Pose]):
+    """The poses at one place with all HEADINGS, each made when it is asked for: many waypoints have millions."""
+
+    def __init__(self, x: float, y: float):
+        self._x, self._y = x, y
+
+    def __len__(self) -> int:
+        return HEADINGS
+
+    @overload
+    def __getitem__(self, index: int) -> Pose: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Pose]: ...
+
+    def __getitem__(self, index: int | slice) -> Pose | list[Pose]:
+        if isinstance(index, slice):
+            return [(self._x, self._y, heading) for heading in _HEADINGS[index]]
+        return self._x, self._y, _HEADINGS[index]
 
 
 class Stop(NamedTuple):
@@ -24,7 +46,7 @@ class Stop(NamedTuple):
         waypoints: indices of the waypoints that are there; none at the start and at the goal, unless they are waypoints too.
     """
 
-    poses: list[Pose]
+    poses: Sequence[Pose]
     waypoints: tuple[int, ...]
 
     def is_passed_at(self, pose: Pose) -> bool:
@@ -64,11 +86,10 @@ def _common(here: Waypoint, there: Waypoint) -> Waypoint | None:
     return here if heading_error((x, y, theta), (x, y, other)) <= SAME else None
 
 
-def _poses(place: Waypoint) -> list[Pose]:
+def _poses(place: Waypoint) -> Sequence[Pose]:
     """Return the poses with which a waypoint may be passed."""
     x, y, theta = place
-    headings = wrap(np.arange(HEADINGS) * (math.tau / HEADINGS)).tolist() if theta is None else [theta]
-    return [(x, y, heading) for heading in headings]
+    return AnyHeading(x, y) if theta is None else [(x, y, theta)]
 
 
 def least_length(problem: Problem, waypoints: Sequence[Waypoint], proved: Mapping[tuple[Waypoint, Waypoint], float]) -> float:

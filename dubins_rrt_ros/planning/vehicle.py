@@ -5,14 +5,14 @@ import math
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 import shapely
 
-from .option import OptionError, TextForm, convert_options, documented, is_number, option, options
+from .option import UNSET, OptionError, TextForm, convert_options, documented, is_number, option, options
 from .text import quoted
 
 #: A point (x, y) [m].
@@ -32,6 +32,8 @@ class DoubtfulVehicle(UserWarning):
     """A warning: a size of a vehicle that has no effect, as another one takes its place."""
 
 
+#: Options that others may take the place of.
+RADII = ("turning_radius", "robot_radius")
 #: Options that take the place of others.
 OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius", "any_goal_heading": "goal_tolerance_yaw"}
 
@@ -116,16 +118,17 @@ class Vehicle:
     hitch, lower bounds are those without obstacles, and it is not proved that there is no path. A `wheelbase` L and a
     `max_steering_angle` phi, set together, determine the turning radius, L / tan(phi) (the paper's equation 1). `from_footprint`
     and `from_wheelbase` say so by their names. A radius that is given beside what it is derived from has no effect, of which a
-    `UserWarning` tells.
+    `UserWarning` tells. What `dataclasses.replace` keeps of another vehicle was not given: a radius is derived anew, and stays
+    where there is nothing any more that it is derived from.
 
     Raises:
         OptionError: an option is of the wrong type or out of range, the footprint is no polygon, or one of
             wheelbase and steering angle is missing.
     """
 
-    turning_radius: float = option(1.0, "minimum turning radius", unit="m", low=0.001, high=10_000.0)
+    turning_radius: float = option(1.0, "minimum turning radius", unit="m", low=0.001, high=10_000.0, may_be_derived=True)
     robot_radius: float = option(0.2, "radius of the disc around the reference point that covers the vehicle",
-                                 unit="m", low=0.0, high=1000.0)
+                                 unit="m", low=0.0, high=1000.0, may_be_derived=True)
     footprint: tuple[Point, ...] = option(
         (), "corners of the vehicle's outline as seen from its reference point, x ahead: [[x, y], ...] in m, in place of "
         "robot_radius; empty is unset", text_form=TextForm(_read_footprint, _footprint_text))
@@ -133,20 +136,29 @@ class Vehicle:
                               low=0.0, high=1000.0)
     max_steering_angle: float = option(0.0, "maximum steering angle, with wheelbase in place of turning_radius; 0 is unset",
                                        unit="rad", low=0.0, high=1.57)
+    #: The radii of the vehicle of which `dataclasses.replace` makes this one, and which it hands on as if they were given.
+    _before: InitVar[Mapping[str, float] | None] = field(default=None, kw_only=True)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, _before: Mapping[str, float] | None) -> None:
+        given = {name for name in RADII if getattr(self, name) is not UNSET}
+        for item in options(Vehicle):
+            if item.name in RADII and item.name not in given:
+                object.__setattr__(self, item.name, item.default)
         convert_options(self)
+        given -= {name for name, radius in (_before or {}).items() if getattr(self, name) == radius}
         if (self.wheelbase > 0) != (self.max_steering_angle > 0):
             raise OptionError(f"wheelbase is {self.wheelbase:g} m and max_steering_angle {self.max_steering_angle:g} rad; "
                               "set both at once, or neither and turning_radius")
         if self.wheelbase > 0:
             self._derive("wheelbase", self.wheelbase / math.tan(self.max_steering_angle), f"wheelbase {self.wheelbase:g} m "
-                         f"and max_steering_angle {self.max_steering_angle:g} rad make a turning radius of")
+                         f"and max_steering_angle {self.max_steering_angle:g} rad make a turning radius of", given)
         if self.footprint:
-            self._derive("footprint", max(math.hypot(x, y) for x, y in self.footprint), "footprint has its farthest corner at")
+            farthest = max(math.hypot(x, y) for x, y in self.footprint)
+            self._derive("footprint", farthest, "footprint has its farthest corner at", given)
+        object.__setattr__(self, "_before", {name: getattr(self, name) for name in RADII})
 
     @classmethod
-    def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = 0.2,
+    def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = UNSET,
                        footprint: Sequence[Point] | str = ()) -> "Vehicle":
         """Make a car whose turning radius is wheelbase / tan(max_steering_angle) [m, rad].
 
@@ -201,14 +213,14 @@ class Vehicle:
         inscribed = self.inscribed_radius
         return self.turning_radius if self.turning_radius >= inscribed else 2 * inscribed
 
-    def _derive(self, by: str, value: float, what: str) -> None:
-        """Set the radius in whose place another option is used; warn of one that was given, which its default does not tell."""
+    def _derive(self, by: str, value: float, what: str, given: set[str]) -> None:
+        """Set the radius in whose place another option is used; warn of another one that was given."""
         derived = next(item for item in options(Vehicle) if item.name == OVERRIDING[by])
-        given = getattr(self, derived.name)
+        present = getattr(self, derived.name)
         try:
             object.__setattr__(self, derived.name, derived.convert(value))
         except OptionError:
             raise OptionError(f"{what} {value:.6g} m; that may be {derived.allowed()}") from None
-        if given != derived.default and not math.isclose(given, value):
-            warnings.warn(f"{derived.name} {given:g} m has no effect, as {by} takes its place: it is {value:.6g} m",
+        if derived.name in given and not math.isclose(present, value):
+            warnings.warn(f"{derived.name} {present:g} m has no effect, as {by} takes its place: it is {value:.6g} m",
                           DoubtfulVehicle, stacklevel=4)  # of the call of the constructor, which a dataclass writes

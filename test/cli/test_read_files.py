@@ -123,8 +123,9 @@ def test_a_pose_that_is_none_is_named(text, names, capsys):
     assert all(name in line for name in ["poses.txt: ", *names]), line
 
 
-def test_a_rotation_that_is_not_normalised_is_taken(capsys):
-    Path("poses.txt").write_text(ECHOED.replace("w: 1.0", "w: 7.0"))
+@pytest.mark.parametrize("w", [7.0, 1e200, 1.7e308])
+def test_a_rotation_that_is_not_normalised_is_taken(w, capsys):
+    Path("poses.txt").write_text(ECHOED.replace("w: 1.0", f"w: {w}"))
     assert "passes" in run("audit", "poses.txt", "square.wkt", status=0, capsys=capsys).out
 
 

@@ -35,6 +35,9 @@ def test_the_disc_of_a_footprint_covers_it():
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: Vehicle(footprint=SQUARE, robot_radius=0.9),
      "robot_radius 0.9 m has no effect, as footprint takes its place: it is 0.5 m"),
+    (lambda: Vehicle(footprint=SQUARE, robot_radius=0.2), "robot_radius 0.2 m has no effect"),
+    (lambda: Vehicle.from_wheelbase(2.0, 0.5, robot_radius=0.2, footprint=SQUARE), "robot_radius 0.2 m has no effect"),
+    (lambda: Vehicle(1.0, wheelbase=2.0, max_steering_angle=math.pi / 4), "turning_radius 1 m has no effect"),
     (lambda: Vehicle(turning_radius=7.0, wheelbase=2.0, max_steering_angle=math.pi / 4),
      "turning_radius 7 m has no effect, as wheelbase takes its place: it is 2 m"),
     (lambda: Vehicle.from_wheelbase(2.0, 0.5, robot_radius=0.9, footprint=SQUARE), "robot_radius 0.9 m has no effect"),
@@ -52,9 +55,18 @@ def test_a_radius_that_is_the_derived_one_or_was_not_given_is_not_warned_of():
         assert Vehicle(**values(car)) == replace(car) == pickle.loads(pickle.dumps(car)) == car
         assert Vehicle(robot_radius=0.9, footprint=()).robot_radius == 0.9
         assert replace(Vehicle(), footprint=SQUARE).robot_radius == 0.5
+        assert replace(Vehicle(3.0, 0.9), footprint=SQUARE) == Vehicle(3.0, footprint=SQUARE)
+        twice = replace(Vehicle(footprint=SQUARE), footprint=[(2 * x, 2 * y) for x, y in SQUARE])
+        assert twice.robot_radius == replace(pickle.loads(pickle.dumps(twice)), footprint=()).robot_radius == 1.0
+        assert replace(car, wheelbase=4.0).turning_radius == 4.0 / math.tan(0.5)
         leaving = plan(Problem(GridMap(WALL, 0.1, (0.0, 0.0, 0.0)), Vehicle(0.5, footprint=SQUARE),
                                (0.69, 2.0, 0.0), (3.5, 2.0, 0.0), start_slack=0.1), Settings(planner="rrt", planning_time=60.0))
         assert leaving.solved and leaving.start_too_near
+
+
+def test_a_radius_that_is_none_is_refused():
+    with pytest.raises(OptionError, match="robot_radius is None"):
+        Vehicle(robot_radius=None)
 
 
 def test_the_place_of_the_warning_is_that_of_the_call():

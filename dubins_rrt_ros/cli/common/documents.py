@@ -124,12 +124,20 @@ def _planar(number: int, stamped: Any) -> list[float]:
         x, y, z, w = (plain_float(orientation[name]) for name in "xyzw")
     except (ValueError, TypeError, LookupError):
         raise _NoPose(f"pose {number} is {quoted(stamped)}; give a geometry_msgs/PoseStamped of finite numbers") from None
-    norm = math.hypot(x, y, z, w)
-    along, across = w * w + x * x - y * y - z * z, 2 * (w * z + x * y)
-    if not (LEAST_NORM <= norm < math.inf and math.hypot(along, across) >= LEAST_IN_PLANE * norm**2):
+    if (yaw := _yaw(x, y, z, w)) is None:
         raise _NoPose(f"pose {number} has the quaternion x {x:g}, y {y:g}, z {z:g}, w {w:g}, from which no yaw follows; "
                       "give a rotation about z (no rotation is w 1)")
-    return [px, py, math.atan2(across, along)]
+    return [px, py, yaw]
+
+
+def _yaw(*quaternion: float) -> float | None:
+    """Return the yaw of a quaternion x, y, z, w; None where it is no rotation, or one that sets the x axis upright."""
+    norm = math.hypot(*quaternion)
+    if not LEAST_NORM <= norm < math.inf:  # written so that NaN is refused too
+        return None
+    x, y, z, w = (component / norm for component in quaternion)
+    along, across = w * w + x * x - y * y - z * z, 2 * (w * z + x * y)
+    return math.atan2(across, along) if math.hypot(along, across) >= LEAST_IN_PLANE else None
 
 
 def read_text(file: str) -> str:
