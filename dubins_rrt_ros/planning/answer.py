@@ -67,11 +67,12 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
         running: True while the search goes on.
         proved: True if the gap is the one that was to be proved.
     """
-    path, samples = answer.path, answer.samples
+    path = answer.path
     so_far = " so far" if running else ""
     above = _above_the_least(problem, settings, answer, bounds, "proved to be " if proved and not problem.is_free else "")
+    budget = settings.samples if settings.planner == "rrt_star" and not running else 0
     found = f", found by {ALGORITHMS[answer.found_by]}" if answer.found_by else ""
-    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {effort(samples, elapsed, cancelled)}"
+    message = f"Path of {path.length:.2f} m{so_far}{above}{found}, {effort(answer.samples, elapsed, cancelled, budget)}"
     if problem.vehicle.required_clearance < 0:
         message += f"; {explain.NO_DISC}, so that obstacles raise no bound"
     if problem.is_free:
@@ -79,9 +80,15 @@ def success_message(problem: Problem, settings: Settings, answer: AuditedPath, b
     return f"{message}{end_clause(problem, path)}."
 
 
-def effort(samples: int, elapsed: float, cancelled: bool) -> str:
-    """Return after how many samples and in what time [s] a path was found, and whether that was the end, as a clause."""
-    drawn = f"after {samples} sample{'' if samples == 1 else 's'}" if samples else "before the first sample,"
+def effort(samples: int, elapsed: float, cancelled: bool, budget: int = 0) -> str:
+    """Return after how many samples and in what time [s] a path was found, and whether that was the end, as a clause.
+
+    Args:
+        budget: number of samples that were asked for, which is told where they were fewer.
+    """
+    of_budget = f" of {budget}" if samples < budget else ""
+    many = f"{of_budget} sample{'' if samples == 1 and not of_budget else 's'}"
+    drawn = f"after {samples}{many}" if samples else f"before the first{many if budget else ' sample'},"
     return f"{'cancelled ' if cancelled else ''}{drawn} in {elapsed:.3g} s"
 
 

@@ -104,7 +104,9 @@ class Settings:
 
     @classmethod
     def paper(cls, **others: Any) -> "Settings":
-        """Make the settings of the paper's plain RRT and RRT*: without hybrid A*, shortcuts and guided headings.
+        """Make the settings of plain RRT and RRT*: without hybrid A*, shortcuts and guided headings.
+
+        They are the paper's algorithms, but for the parent of a node of RRT*, which is chosen among the near ones.
 
         Args:
             others: options by name, which take precedence.

@@ -157,6 +157,14 @@ def test_samples_are_the_samplers():
     assert plan(problem(), settings(sampler=upper_half)).solved
 
 
+def test_samples_may_lie_in_memory_in_any_way():
+    plain = settings(informed=False, shortcut=False)
+    expected = plan(problem(None), replace(plain, sampler=upper_half)).tree
+    for stored in (np.asfortranarray, lambda poses: np.asarray(poses, ">f8"), lambda poses: np.repeat(poses, 2, axis=0)[::2]):
+        tree = plan(problem(None), replace(plain, sampler=lambda rng, n, stored=stored: stored(upper_half(rng, n)))).tree
+        assert (tree.poses == expected.poses).all()
+
+
 def raises(poses):
     raise ZeroDivisionError("no such\nplace")
 

@@ -5,6 +5,7 @@ Runs without a path that passed its check count as infinite.
 """
 
 import math
+import statistics
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -108,9 +109,16 @@ def _figures(group: list[RunRecord], best: Best, marks: list[float]) -> dict[str
     """Return the figures of a planner's runs on a problem."""
     return {"runs": len(group), "solved": sum(run.solved for run in group),
             "time_to_first": quartiles(run.first[0] for run in group), "first_cost": quartiles(run.first[1] for run in group),
-            "final_cost": quartiles(run.cost for run in group),
+            "final_cost": quartiles(run.cost for run in group), "final_cost_of_solved": _moments(run.cost for run in group),
             "cost_at": {f"{mark:g}": quartiles(run.cost_at(mark) for run in group) for mark in marks},
             "time_to_within": {f"{share:g}": median(run.time_to((1 + share) * best.cost) for run in group) for share in EXCESSES}}
+
+
+def _moments(values: Iterable[float]) -> dict[str, float]:
+    """Return the mean of the finite values and their standard deviation, each infinite where there are too few for it."""
+    solved = [value for value in values if math.isfinite(value)]
+    return {"mean": statistics.fmean(solved) if solved else math.inf,
+            "standard_deviation": statistics.stdev(solved) if len(solved) > 1 else math.inf}
 
 
 def _overall(planner: str, runs: Runs, best: Mapping[str, Best], marks: list[float]) -> dict[str, Any]:
