@@ -99,6 +99,13 @@ def test_a_pose_in_a_frame_that_nobody_knows_is_refused_whichever_way_it_comes(t
         assert_says(said_of(talk, way, at(), frame), "202", "TF_ERROR", f"The {name} pose", f"'{frame}'", "'map'")
 
 
+def test_for_slash_map_it_is_the_slash_that_is_to_be_left_out_whichever_way_the_pose_comes(talk):
+    for way in WAYS:
+        told = said_of(talk, way, at(), "/map")
+        assert_says(told, "202", "TF_ERROR", "in frame '/map'", "leading slash; leave it out")
+        assert "publish that transform" not in told["message"]
+
+
 #: Names that would forge lines of the log, clear the screen, or fill the disk.
 FORGED = ["map\n[ERROR] [1.0] [planner]: forged", "\x1b[2J\x1b[31mred\x1b[0m", "a\rb\u2028c\u202ed", "x" * 1_000_000]
 

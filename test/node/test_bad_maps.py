@@ -152,6 +152,21 @@ def test_a_map_whose_origin_is_turned_is_planned_on(on_other_maps):
     assert_says(on_other_maps.plan(START, goal)[0], "203", "START_OUTSIDE_MAP")
 
 
+@pytest.mark.parametrize("origin", [(1e6, -1e6, 0.5), (5e5, 5.3e6, -2.0)])
+def test_a_path_a_million_metres_off_passes_check(on_other_maps, origin):
+    far = GridMap(box().data, 0.1, origin)
+    on_other_maps.client.set_parameters(check_invariants=True)
+    try:
+        take(on_other_maps, grid_message(far, "map", Time()))
+        (start, goal) = ((*far.to_map_frame(np.array(pose[:2])).tolist(), pose[2] + origin[2]) for pose in (START, GOAL))
+        told, poses = on_other_maps.plan(start, goal)
+    finally:
+        on_other_maps.client.set_parameters(check_invariants=False)
+    assert_says(told, "0", "NONE")
+    assert told["audit"] == "ok"
+    assert poses[0].pose.position == pose_message(start).position
+
+
 @pytest.mark.parametrize(("value", "name"), [(-128, "GOAL_OCCUPIED"), (-2, "GOAL_OCCUPIED"), (101, "GOAL_OCCUPIED"),
                                              (127, "GOAL_OCCUPIED"), (25, "NONE"), (26, "GOAL_OCCUPIED")])
 def test_cells_of_any_value_are_free_only_where_they_say_so(on_other_maps, value, name):

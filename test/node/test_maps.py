@@ -49,6 +49,21 @@ def test_a_map_that_comes_again_and_again_is_said_once(plain):
     assert sum("Took a map" in line for line in lines) == sum("The map is ready" in line for line in lines) == 1, lines
 
 
+def test_a_map_that_comes_again_unchanged_as_each_second_writes_no_line(plain):
+    process, client = plain
+    publish(client, process, DETOUR)
+    client.mark()
+    said = len(process.output)
+    for second in range(10):
+        message = occupancy(DETOUR)
+        message.header.stamp.sec = message.info.map_load_time.sec = second
+        client.publish_map(message)
+        client.call(Trigger, "cancel")
+    client.wait_for_word("no poses in goal_poses")
+    lines = process.output[said:].splitlines()
+    assert [line for line in lines if "no poses in goal_poses" not in line] == []
+
+
 def test_a_map_that_comes_again_after_a_refused_one_ends_the_remark_on_an_older_map(plain):
     process, client = plain
     client.set_parameters(**QUICK)
