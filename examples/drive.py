@@ -332,6 +332,8 @@ def main() -> int:
         parser.error("give a map of cells")
     rngs = [np.random.default_rng((arguments.seed, number)) for number in range(arguments.robots + 1)]
     floor = Floor(grid, rngs[0])
+    if arguments.log:
+        arguments.log.mkdir(parents=True, exist_ok=True)
     rclpy.init()
     executor = SingleThreadedExecutor()
     cars: list[Car] = []
