@@ -3,7 +3,7 @@
 A box is a row of eleven numbers, in metres and radians:
     0, 1    x, y        middle
     2, 3    dx, dy      unit vector along it
-    4, 5    l, w        half its length, and half its width
+    4, 5    l, w        half its length, and half its width, by much more than what rounding makes of places
     6, 7    h, dh       middle and half the range of its headings, at most pi
     8       u           potential: no path from the start reaches the box sooner
     9       cost        the cost from the start there; not a number where it is not known
@@ -22,8 +22,8 @@ PAIRS = 200_000
 HALVINGS, MAX_PAIRS = 14, 20_000
 #: What a bound may fall short of the curve between the boxes' middles, in turning radii; a smaller share takes more halvings.
 SHORT = 1e-3
-#: The sizes of a box; and what leaves the pose in its middle.
-SIZES, MIDDLE = (4, 5, 7), np.array((1, 1, 1, 1, 0, 0, 1, 0, 1, 1, 1))
+#: The sizes of a box.
+SIZES = 4, 5, 7
 
 
 def too_high(ahead: np.ndarray, boxes: np.ndarray, radius: float, margin: float) -> np.ndarray:
@@ -50,7 +50,7 @@ def least_length(a: np.ndarray, b: np.ndarray, radius: float, enough: np.ndarray
     if halvings == 0 or not 0 < len(short) <= MAX_PAIRS:
         return least
     # No more can be shown than for the poses in the middle: a little less is enough where that is too short.
-    middles = _least_of_whole(a[short] * MIDDLE, b[short] * MIDDLE, radius)
+    middles = _least_of_whole(part(a[short], 0, 0), part(b[short], 0, 0), radius)
     wanted = np.where(middles < enough[short], np.maximum(middles - SHORT * radius, least[short]), enough[short])
     some = least[short] < wanted
     short, wanted = short[some], wanted[some]

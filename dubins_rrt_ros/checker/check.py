@@ -134,10 +134,9 @@ class _Bound:
         self._document, self._world, request = document, world, document["request"]
         self._radius, self._bound, self._tolerance = request["turning_radius"], document["bound"], request["goal_tolerance_xy"]
         self._start, self._goal = world.own(request["start"]), world.own(request["goal"])
-        self._start_box = goal_boxes(self._start, 0, 0, 0)
-        self._goal_boxes = goal_boxes(self._goal, self._tolerance, request["goal_tolerance_yaw"], self._bound)
-        self._inner = inner_radius(request)
-        self._margin = MARGIN * (document["limit"] + world.size)
+        self._margin, self._inner = margin_of(document, world), inner_radius(request)
+        self._start_box = goal_boxes(self._start, 0, 0, 0, self._margin)
+        self._goal_boxes = goal_boxes(self._goal, self._tolerance, request["goal_tolerance_yaw"], self._bound, self._margin)
 
     def check(self) -> None:
         """Raise Refused where something of the proof does not hold."""
@@ -234,15 +233,25 @@ class _Bound:
                               f"{excess[worst]:.3g} m higher than those before it allow")
 
 
-def goal_boxes(goal: tuple[float, float, float], tolerance: float, turn: float, bound: float) -> np.ndarray:
-    """Return boxes that cover the poses within tolerances of one, with a potential, whose costs are not known."""
+def margin_of(document: dict[str, Any], world: World) -> float:
+    """Return the margin for rounding of a certificate's proof [m]."""
+    return float(MARGIN * (document["limit"] + document["request"]["turning_radius"] + world.size))
+
+
+def goal_boxes(goal: tuple[float, float, float], tolerance: float, turn: float, bound: float, margin: float) -> np.ndarray:
+    """Return boxes that cover the poses within tolerances of one, with a potential, whose costs are not known.
+
+    They are larger by a margin for rounding [m].
+    """
     parts, turn = GOAL_PARTS if tolerance else 1, min(turn, math.pi)
     counts = parts, parts, max(1, math.ceil(2 * turn / GOAL_TURN))
     index = np.indices(counts).reshape(3, -1).T
     whole = [*goal[:2], 1.0, 0.0, tolerance, tolerance, goal[2], turn, bound, math.nan, 0.0]
     boxes = part(np.tile(whole, (len(index), 1)), 2 * index / counts - 1, 2 * (index + 1) / counts - 1)
     off = np.maximum(np.abs(boxes[:, :2] - goal[:2]) - boxes[:, 4:6], 0)
-    return boxes[np.hypot(*off.T) <= tolerance]
+    boxes = boxes[np.hypot(*off.T) <= tolerance]
+    boxes[:, 4:6] += margin
+    return boxes
 
 
 def boxes_on(gates: np.ndarray, rows: np.ndarray, margin: float) -> np.ndarray:

@@ -7,6 +7,11 @@ from support.cases import scaled
 from dubins_rrt_ros.checker import bounds
 from dubins_rrt_ros.planning.curves.dubins import lengths
 
+#: The turning radius of the tests [m], and the words of a curve: which way each of its arcs turns.
+RADIUS = 0.7
+STRAIGHT_WORDS, TURNING_WORDS = [(1, 0, 1), (1, 0, -1), (-1, 0, 1), (-1, 0, -1)], [(1, -1, 1), (-1, 1, -1)]
+#: By so much boxes are larger than what they hold [m].
+MARGIN = 1e-11
 #: What docs/proof.md says that the formulas lose by rounding, as a share of the lengths in them.
 LOST = 1e-14
 
@@ -24,6 +29,53 @@ def poses_in(boxes, rng):
     along, across = share[0] * boxes[:, 4], share[1] * boxes[:, 5]
     return np.column_stack([boxes[:, 0] + along * boxes[:, 2] - across * boxes[:, 3],
                             boxes[:, 1] + along * boxes[:, 3] + across * boxes[:, 2], boxes[:, 6] + share[2] * boxes[:, 7]])
+
+
+def driven(poses, word, amounts):
+    """The poses after a word's arcs of some amounts: turns [rad], or the straight line [m]."""
+    x, y, heading = poses.T
+    for turn, amount in zip(word, amounts, strict=True):
+        if turn:
+            x = x + turn * RADIUS * (np.sin(heading + turn * amount) - np.sin(heading))
+            y = y - turn * RADIUS * (np.cos(heading + turn * amount) - np.cos(heading))
+            heading = heading + turn * amount
+        else:
+            x, y = x + amount * np.cos(heading), y + amount * np.sin(heading)
+    return np.column_stack([x, y, heading])
+
+
+def curves(rng, word, count, size):
+    """Boxes, other boxes to which curves of a word lead from them, and their lengths; many have an arc of next to nothing."""
+    share = rng.random((3, count)) ** rng.choice([1, 6, 100], (3, count))
+    middle = 3 * share[1] if word[1] == 0 else np.pi * (1 + share[1])
+    amounts = 2 * np.pi * share[0], middle, 2 * np.pi * share[2]
+    a, b = (random_boxes(rng, count, size) for _ in range(2))
+    off = driven(poses_in(a, rng), word, amounts) - poses_in(b, rng)
+    b[:, (0, 1, 6)] += off + np.column_stack([np.zeros((count, 2)), 2 * np.pi * rng.integers(-2, 3, count)])
+    for boxes in (a, b):
+        boxes[:, 4:6] += MARGIN
+    return a, b, RADIUS * (amounts[0] + amounts[2]) + middle * (RADIUS if word[1] else 1)
+
+
+def bound_of(word, a, b):
+    """The checker's bound of a word."""
+    return (bounds._three_turns(a, b, word[0], RADIUS) if word[1]
+            else bounds._turn_straight_turn(a, b, word[0], word[2], RADIUS))
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-3, 0.02, 0.3, 2.0])
+@pytest.mark.parametrize("word", STRAIGHT_WORDS + TURNING_WORDS)
+def test_no_bound_of_a_word_is_above_a_curve_of_it(word, size):
+    a, b, length = curves(np.random.default_rng(1), word, scaled(20_000), size)
+    assert (bound_of(word, a, b) <= length + 1e-9).all()
+
+
+@pytest.mark.parametrize("word", STRAIGHT_WORDS + TURNING_WORDS)
+@pytest.mark.parametrize(("size", "off"), [(0.0, 1e-5), (1e-3, 0.01), (0.02, 0.2)])
+def test_the_bound_of_a_word_is_its_curve_between_poses_and_mostly_near_to_it_between_small_boxes(word, size, off):
+    """Less often where the middle one of three turns is hardly more than half a turn, as its bound grows with a root there."""
+    a, b, length = curves(np.random.default_rng(2), word, 5000, size)
+    assert (bound_of(word, a, b) >= length - off).mean() > (0.5 if word[1] and size else 0.94)
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 2.0])

@@ -142,7 +142,7 @@ def test_squares_and_a_vehicle_without_a_size_are_refused(tmp_path):
 @pytest.mark.parametrize("turn", [0.0, 0.04, 0.7])
 def test_boxes_of_the_goal_cover_where_it_is_reached_and_little_more(tolerance, turn):
     rng = np.random.default_rng(1)
-    boxes = goal_boxes((1.0, 2.0, 0.5), tolerance, turn, 7.0)
+    boxes = goal_boxes((1.0, 2.0, 0.5), tolerance, turn, 7.0, 0.0)
     angle, share = rng.uniform(-np.pi, np.pi, 500), np.sqrt(rng.random(500)) * tolerance
     poses = np.column_stack([1 + share * np.cos(angle), 2 + share * np.sin(angle), 0.5 + turn * rng.uniform(-1, 1, 500)])
     off = np.abs(poses[:, None] - boxes[:, (0, 1, 6)])

@@ -63,6 +63,20 @@ def test_a_bound_keeps_a_margin_for_rounding(tmp_path):
         assert said in found and bool(said) == bool(found)
 
 
+@pytest.mark.parametrize(("start", "turn", "metres"), [
+    ((0.4923326448972576, 0.5327702593820443, -0.5448051817850326), "R", 0.5171546345221005),
+    ((0.4522617728887003, 0.4618105227150859, -0.838416691898141), "R", 0.12954882508620977),
+    ((0.4650957540061147, 0.4700553667472125, 0.8877617585703992), "R", 0.27571780593235745),
+    *(((0.5, 0.5, heading), "LR"[heading % 2], 0.1 + 0.05 * heading) for heading in range(6))])
+def test_the_bound_of_a_single_arc_is_not_a_whole_turn_too_high(start, turn, metres, tmp_path):
+    """Of the straight line between two turns, which is none here, rounding alone would tell the direction."""
+    file = room(tmp_path)
+    document = claim(file, start, [[turn, 0.2, metres]])
+    assert verdict(document | {"bound": metres - 1e-7}, file, tmp_path) == ""
+    above = verdict(document | {"bound": metres + 0.1, "limit": metres + 0.1}, file, tmp_path)
+    assert "higher than those before it allow" in above
+
+
 def test_poses_have_three_numbers(tmp_path):
     file = room(tmp_path)
     document = claim(file, (0.3, 0.3, 0.2), BEND)

@@ -13,7 +13,7 @@ import shapely
 from scipy import ndimage
 
 from ...checker.bounds import too_high
-from ...checker.check import MARGIN, goal_boxes, inner_radius, ways
+from ...checker.check import goal_boxes, inner_radius, margin_of, ways
 from ...checker.levels import FROM_START, TO_GOAL, Squares
 from ...checker.maps import UnreadableMap, digest_of_cells, read_map
 from ...checker.maps import World as CheckedMap
@@ -94,10 +94,10 @@ def _without_obstacles(document: dict[str, Any], world: CheckedMap) -> dict[str,
     """Return the proof by the Dubins curves alone, where the vehicle covers no disc around its reference point."""
     request, length = document["request"], document["length"]
     start, goal = (world.own(request[name]) for name in ("start", "goal"))
-    goals = goal_boxes(goal, request["goal_tolerance_xy"], request["goal_tolerance_yaw"], length)
-    margin = 2 * MARGIN * (length + world.size)
-    box = goal_boxes(start, 0, 0, 0)
-    bound = length - margin - float(too_high(box, goals, request["turning_radius"], margin).max())
+    margin = margin_of(document | {"limit": length}, world)
+    goals = goal_boxes(goal, request["goal_tolerance_xy"], request["goal_tolerance_yaw"], length, margin)
+    box = goal_boxes(start, 0, 0, 0, margin)
+    bound = length - 2 * margin - float(too_high(box, goals, request["turning_radius"], 2 * margin).max())
     return {"bound": max(0.0, bound), "limit": length, "levels": [], "cells": [], "boxes": [],
             "squares": {"corner": [0, 0], "side": 1, "free": []}, "from_start": [], "to_goal": []}
 
@@ -135,7 +135,7 @@ class _Draft:
             "from_start": _rows(from_start), "to_goal": _rows(to_goal)}
         self._squares = Squares(self._document)
         self._cells = _labelled(self._squares.parts)
-        self._margin = MARGIN * (self._document["limit"] + world.size)
+        self._margin = margin_of(document | self._document, world)
 
     def proved(self, gap: float, bound: float, is_over: Callable[[], bool]) -> dict[str, Any] | None:
         """Return the fields of the proof with the greatest bound that there is time for, if it is above `bound` [m].
@@ -173,7 +173,7 @@ class _Draft:
         start, goal = (self._world.own(self._request[name]) for name in ("start", "goal"))
         start_cell, cost = self._cell_at(start)
         tolerance, squares = self._request["goal_tolerance_xy"], self._squares
-        goals = goal_boxes(goal, tolerance, self._request["goal_tolerance_yaw"], 0.0)
+        goals = goal_boxes(goal, tolerance, self._request["goal_tolerance_yaw"], 0.0, self._margin)
         if tolerance == 0:
             goal_cell, goals[:, 9] = self._cell_at(goal)
             cells, excess = {goal_cell}, squares.at(TO_GOAL, *goal[:2])[1]
@@ -181,7 +181,7 @@ class _Draft:
             near = squares.near(*goal[:2], tolerance + 2 * self._margin)
             cells = set(self._cells[:, near].ravel().tolist()) - {NONE}
             excess = float(squares.corners[TO_GOAL][near & squares.domain].max())
-        start_box = goal_boxes(start, 0, 0, 0)
+        start_box = goal_boxes(start, 0, 0, 0, self._margin)
         start_box[:, 9] = cost
         return Ends(start_box, goals, start_cell, cells, max(0.0, excess))
 
