@@ -18,13 +18,8 @@ from .text import quoted
 _Class = TypeVar("_Class", bound=type)
 
 
-class _Unset:
-    def __repr__(self) -> str:
-        return "unset"
-
-
-#: What a field holds until its class' `__post_init__` where nothing was given, and its default must not be taken for given.
-UNSET: Any = _Unset()
+class Assumed(float):
+    """A default that is told from the same number given, until the field is converted."""
 
 
 class OptionError(PlanningError, ValueError):
@@ -118,11 +113,10 @@ class Option(NamedTuple):
 
 
 def option(default: Any, description: str, *, unit: str = "", low: float | None = None, high: float | None = None,
-           choices: tuple[str, ...] = (), text_form: TextForm | None = None, may_be_derived: bool = False) -> Any:
-    """Return a dataclass field that is an option; one that may be derived from others is UNSET where nothing is given."""
-    metadata = {"default": default, "unit": unit, "low": low, "high": high, "choices": choices, "help": description,
-                "text_form": text_form}
-    return dataclasses.field(default=UNSET if may_be_derived else default, metadata=metadata)
+           choices: tuple[str, ...] = (), text_form: TextForm | None = None) -> Any:
+    """Return a dataclass field that is an option."""
+    metadata = {"unit": unit, "low": low, "high": high, "choices": choices, "help": description, "text_form": text_form}
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 def options(cls: type) -> tuple[Option, ...]:
@@ -131,17 +125,16 @@ def options(cls: type) -> tuple[Option, ...]:
 
 
 def _option_of(field: "dataclasses.Field[Any]") -> Option:
-    form, default = field.metadata["text_form"], field.metadata["default"]
-    if form:
-        default = form.write(default)
+    form = field.metadata["text_form"]
+    default = form.write(field.default) if form else plain_number(field.default)
     if isinstance(default, tuple):
         default = list(default)
-    return Option(name=field.name, type=type(default), **{**field.metadata, "default": default})
+    return Option(name=field.name, type=type(default), default=default, **field.metadata)
 
 
 def documented(cls: _Class) -> _Class:
     """Add the options of a dataclass, with default, unit and range, to its docstring."""
-    defaults = {field.name: field.metadata["default"] for field in dataclasses.fields(cls) if field.metadata}
+    defaults = {field.name: plain_number(field.default) for field in dataclasses.fields(cls)}
     lines = [f"{item.name} ({type(defaults[item.name]).__name__}, default {defaults[item.name]!r}): {item.describe()}"
              for item in options(cls)]
     entries = (textwrap.fill(line, 110, initial_indent=" " * 8, subsequent_indent=" " * 12) for line in lines)
@@ -156,7 +149,9 @@ def convert_options(instance: Any) -> None:
 
 
 def plain_number(value: Any) -> Any:
-    """Return a number or Boolean of NumPy as Python's own, and anything else as it is."""
+    """Return a number or Boolean of NumPy as Python's own, a default as one that is given, and anything else as it is."""
+    if isinstance(value, Assumed):
+        return float(value)
     return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
 
 

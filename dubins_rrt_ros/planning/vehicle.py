@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .option import UNSET, OptionError, TextForm, convert_options, documented, is_number, option, options
+from .option import Assumed, OptionError, TextForm, convert_options, documented, is_number, option, options
 from .text import quoted
 
 #: A point (x, y) [m].
@@ -32,8 +32,9 @@ class DoubtfulVehicle(UserWarning):
     """A warning: a size of a vehicle that has no effect, as another one takes its place."""
 
 
-#: Options that others may take the place of.
+#: Options that others may take the place of, and their defaults [m].
 RADII = ("turning_radius", "robot_radius")
+TURNING_RADIUS, ROBOT_RADIUS = Assumed(1.0), Assumed(0.2)
 #: Options that take the place of others.
 OVERRIDING = {"footprint": "robot_radius", "wheelbase": "turning_radius", "any_goal_heading": "goal_tolerance_yaw"}
 
@@ -126,9 +127,9 @@ class Vehicle:
             wheelbase and steering angle is missing.
     """
 
-    turning_radius: float = option(1.0, "minimum turning radius", unit="m", low=0.001, high=10_000.0, may_be_derived=True)
-    robot_radius: float = option(0.2, "radius of the disc around the reference point that covers the vehicle",
-                                 unit="m", low=0.0, high=1000.0, may_be_derived=True)
+    turning_radius: float = option(TURNING_RADIUS, "minimum turning radius", unit="m", low=0.001, high=10_000.0)
+    robot_radius: float = option(ROBOT_RADIUS, "radius of the disc around the reference point that covers the vehicle",
+                                 unit="m", low=0.0, high=1000.0)
     footprint: tuple[Point, ...] = option(
         (), "corners of the vehicle's outline as seen from its reference point, x ahead: [[x, y], ...] in m, in place of "
         "robot_radius; empty is unset", text_form=TextForm(_read_footprint, _footprint_text))
@@ -140,10 +141,7 @@ class Vehicle:
     _before: InitVar[Mapping[str, float] | None] = field(default=None, kw_only=True)
 
     def __post_init__(self, _before: Mapping[str, float] | None) -> None:
-        given = {name for name in RADII if getattr(self, name) is not UNSET}
-        for item in options(Vehicle):
-            if item.name in RADII and item.name not in given:
-                object.__setattr__(self, item.name, item.default)
+        given = {name for name in RADII if not isinstance(getattr(self, name), Assumed)}
         convert_options(self)
         given -= {name for name, radius in (_before or {}).items() if getattr(self, name) == radius}
         if (self.wheelbase > 0) != (self.max_steering_angle > 0):
@@ -158,7 +156,7 @@ class Vehicle:
         object.__setattr__(self, "_before", {name: getattr(self, name) for name in RADII})
 
     @classmethod
-    def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = UNSET,
+    def from_wheelbase(cls, wheelbase: float, max_steering_angle: float, *, robot_radius: float = ROBOT_RADIUS,
                        footprint: Sequence[Point] | str = ()) -> "Vehicle":
         """Make a car whose turning radius is wheelbase / tan(max_steering_angle) [m, rad].
 
@@ -171,7 +169,7 @@ class Vehicle:
                    max_steering_angle=max_steering_angle)
 
     @classmethod
-    def from_footprint(cls, footprint: Sequence[Point] | str, *, turning_radius: float = 1.0) -> "Vehicle":
+    def from_footprint(cls, footprint: Sequence[Point] | str, *, turning_radius: float = TURNING_RADIUS) -> "Vehicle":
         """Make a car whose outline is a polygon with these corners (x, y) [m].
 
         Raises:
