@@ -3,7 +3,7 @@
 A box is a row of eleven numbers, in metres and radians:
     0, 1    x, y        middle
     2, 3    dx, dy      unit vector along it
-    4, 5    l, w        half its length, and half its width, by much more than what rounding makes of places
+    4, 5    l, w        half its length, and half its width; far above the rounding of places, from which else a direction came
     6, 7    h, dh       middle and half the range of its headings, at most pi
     8       u           potential: no path from the start reaches the box sooner
     9       cost        the cost from the start there; not a number where it is not known

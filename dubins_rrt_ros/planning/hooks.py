@@ -31,7 +31,7 @@ def draw_poses(sampler: Sampler, rng: np.random.Generator, count: int) -> np.nda
     if given.shape != (count, 3) or given.dtype.kind not in "fiu" or not np.isfinite(given).all():
         raise HookError(f"sampler gave {_described(given)} when asked for {count} poses; it has to give ({count}, 3) finite "
                         "numbers: x [m], y [m], theta [rad]")
-    return given.astype(float, order="C")  # whatever the order of a column_stack, or the bytes of a file
+    return given.astype(float, order="C")  # which is the order that kernels take
 
 
 def are_free(is_free: IsFree, poses: np.ndarray) -> np.ndarray:

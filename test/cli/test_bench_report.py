@@ -149,6 +149,9 @@ def test_a_report_as_csv_has_the_figures_of_the_json():
                    "time_to_within_0.02": result["time_to_within"]["0.02"], "solved": result["solved"]}
         assert {name: row[name] for name in figures} == {name: "" if value is None else str(value)
                                                          for name, value in figures.items()}
+    moments = [[row[f"final_cost_of_solved_{name}"] for name in ("mean", "standard_deviation")] for row in rows]
+    assert list(map(float, moments[0])) == pytest.approx([30.55 / 3, math.sqrt(0.245 / 6)])
+    assert moments[1:] == [["11.0", "0.0"], ["40.0", ""], ["", ""]]
 
 
 def test_a_report_as_latex_has_the_cells_of_the_markdown():

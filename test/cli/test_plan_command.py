@@ -110,13 +110,6 @@ def test_how_a_path_was_found_is_told(hall, capsys):
     assert Settings.paper(samples=7, informed=True) == Settings(samples=7, shortcut=False, heading_sampling="uniform")
 
 
-def test_samples_that_there_was_no_time_for_are_told(hall, capsys):
-    budget = ("--samples", "5000000", "--planning-time", "2", "--seed", "4", "--json", "-")
-    status, out, _ = run(hall, *REQUEST, "--paper", *budget, capsys=capsys)
-    document = json.loads(out)
-    assert status == 0 and f", after {document['samples']} of 5000000 samples in " in document["message"]
-
-
 def test_a_flag_that_another_one_overrides_is_told_and_the_turning_radius_that_results(hall, capsys):
     car = ("--footprint", "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]", "--wheelbase", "0.3",
            "--max-steering-angle", "0.5")

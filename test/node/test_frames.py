@@ -75,14 +75,6 @@ def test_without_tf2_get_plan_refuses_a_pose_in_another_frame_likewise(planner, 
     assert f"The {foreign} pose" in status.message
 
 
-def test_a_leading_slash_is_told_to_be_left_out(planner):
-    planner.statuses.clear()
-    assert planner.call(GetPlan, "get_plan", start=stamped(START, "world"), goal=stamped(GOAL, "/world")).plan.poses == []
-    status = tf_error(planner, "get_plan")
-    assert "'/world'" in status.message and "leading slash; leave it out" in status.message
-    assert "publish that transform" not in status.message
-
-
 def test_poses_in_the_global_frame_and_without_a_frame_need_no_transform(planner):
     path = planner.call(GetPlan, "get_plan", start=stamped(START, "world"), goal=stamped(GOAL, "")).plan
     assert {pose.header.frame_id for pose in path.poses} == {path.header.frame_id} == {"world"}

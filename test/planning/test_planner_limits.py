@@ -113,6 +113,7 @@ def test_what_the_time_limit_cuts_short_is_told(monkeypatch):
                       on_progress=lambda progress: told.append(progress.length))
     assert result.status == Status.NONE
     assert 0 < result.samples < 1_000_000
+    assert f", after {result.samples} of 1000000 samples in " in result.message
     assert told[-1] == pytest.approx(result.length, abs=1e-6)
     again = plan(*read_request(to_document(result, "gap"), problem.map))
     assert (again.path, again.samples) == (result.path, result.samples)
